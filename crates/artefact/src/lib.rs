@@ -1,0 +1,1 @@
+//! What stages read and write: the container, one file per artefact kind, and the stage contract.

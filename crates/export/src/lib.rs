@@ -1,0 +1,1 @@
+//! What users take away: tables, GIS layers, rasters and point clouds.

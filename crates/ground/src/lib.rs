@@ -1,0 +1,1 @@
+//! Ground classification, the Hardy multiquadric terrain model and heights above ground.

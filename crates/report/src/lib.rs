@@ -1,0 +1,1 @@
+//! Maps and pictures of what the pipeline found.

@@ -1,0 +1,1 @@
+//! Gives every point its tree.

@@ -1,0 +1,1 @@
+//! Virtual forests and laser scanners with exact truth.

@@ -1,0 +1,1 @@
+//! Treetops: local maxima of the point cloud.
