@@ -47,13 +47,33 @@ pub fn canonical_order(cloud: &PointCloud) -> Vec<u32> {
     keyed.into_iter().map(|(_, _, index)| index).collect()
 }
 
+/// Compares two points of one cloud by the order of [`canonical_order`], without sorting the cloud.
+///
+/// Equal only for points alike in position and all attributes.
+#[must_use]
+pub fn compare(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::Ordering {
+    let key = |index: usize| {
+        let world = cloud.world(index);
+        let [x, y, z] = world.map(ticks_from_world);
+        (morton(world[0], world[1]), [z, x, y])
+    };
+    key(a)
+        .cmp(&key(b))
+        .then_with(|| compare_attributes(cloud, a, b))
+}
+
 /// Compares all attributes of two points of one cloud, extra columns included.
 #[must_use]
 pub fn compare_attributes(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::Ordering {
     let fixed = |i: usize| {
         let p = cloud.point(i);
         (
-            (p.source_id, p.return_number, p.number_of_returns, p.classification),
+            (
+                p.source_id,
+                p.return_number,
+                p.number_of_returns,
+                p.classification,
+            ),
             (p.intensity, p.flags),
         )
     };
@@ -62,7 +82,10 @@ pub fn compare_attributes(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::O
         .then_with(|| fixed(a).cmp(&fixed(b)))
         .then_with(|| cloud.scan_angle_deg[a].total_cmp(&cloud.scan_angle_deg[b]))
         .then_with(|| {
-            let extra = cloud.extra.values().map(|c| c.value(a).total_cmp(&c.value(b)));
+            let extra = cloud
+                .extra
+                .values()
+                .map(|c| c.value(a).total_cmp(&c.value(b)));
             extra.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         })
 }
@@ -76,13 +99,32 @@ mod tests {
     #[test]
     fn a_power_of_two_square_is_one_run() {
         let codes: Vec<u64> = (0..64)
-            .map(|i| morton(96.0 + f64::from(i % 8) * 0.125, 160.0 + f64::from(i / 8) * 0.125))
+            .map(|i| {
+                morton(
+                    96.0 + f64::from(i % 8) * 0.125,
+                    160.0 + f64::from(i / 8) * 0.125,
+                )
+            })
             .collect();
         let (low, high) = (codes.iter().min().unwrap(), codes.iter().max().unwrap());
         assert_eq!(high - low, 63);
     }
 
     proptest! {
+        #[test]
+        fn the_comparison_agrees_with_the_order(
+            points in prop::collection::vec((0i32..30, 0i32..30, 0i32..3, 0u16..2), 1..60),
+        ) {
+            let mut cloud = PointCloud::new(Frame::new([-7, 3, 0]));
+            for (x, y, z, intensity) in points {
+                let world = [f64::from(x) * 0.1, f64::from(y) * 0.1, f64::from(z)];
+                cloud.push_world(world, &Point { intensity, ..Point::default() });
+            }
+            let order = canonical_order(&cloud);
+            let ascending = |pair: &[u32]| compare(&cloud, pair[0] as usize, pair[1] as usize).is_le();
+            prop_assert!(order.windows(2).all(ascending));
+        }
+
         #[test]
         fn frame_and_input_order_do_not_matter(
             points in prop::collection::vec((0i32..50, 0i32..50, 0i32..4), 1..60),
