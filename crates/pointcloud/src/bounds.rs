@@ -73,7 +73,10 @@ impl Rect {
     /// The rectangle grown by a margin on all sides.
     #[must_use]
     pub fn grown(&self, margin: f64) -> Self {
-        Self { min: self.min.map(|value| value - margin), max: self.max.map(|value| value + margin) }
+        Self {
+            min: self.min.map(|value| value - margin),
+            max: self.max.map(|value| value + margin),
+        }
     }
 
     /// The rectangle moved.
@@ -104,6 +107,12 @@ impl Rect {
     #[must_use]
     pub fn size(&self) -> [f64; 2] {
         [self.max[0] - self.min[0], self.max[1] - self.min[1]]
+    }
+}
+
+impl Default for Rect {
+    fn default() -> Self {
+        Self::EMPTY
     }
 }
 

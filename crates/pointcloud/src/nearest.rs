@@ -51,8 +51,12 @@ impl<const D: usize> Nearest<D> {
     /// The `count` nearest points, nearest first, equal distances by ascending index.
     #[must_use]
     pub fn nearest(&self, at: &[f64; D], count: usize) -> Vec<Neighbour> {
-        let Some(count) = NonZeroUsize::new(count.min(self.len)) else { return Vec::new() };
-        let Some(tree) = &self.tree else { return Vec::new() };
+        let Some(count) = NonZeroUsize::new(count.min(self.len)) else {
+            return Vec::new();
+        };
+        let Some(tree) = &self.tree else {
+            return Vec::new();
+        };
         let found = tree.query(at).nearest_n::<SquaredEuclidean<f64>>(count).execute();
         let mut neighbours = sorted(found);
         // Which of several points at the last distance the tree returns is its own affair: ask for all.
@@ -73,7 +77,9 @@ impl<const D: usize> Nearest<D> {
     }
 
     fn within_squared(&self, at: &[f64; D], squared_m2: f64) -> Vec<Neighbour> {
-        let Some(tree) = &self.tree else { return Vec::new() };
+        let Some(tree) = &self.tree else {
+            return Vec::new();
+        };
         let query = tree.query(at).within::<SquaredEuclidean<f64>>(squared_m2);
         sorted(query.unsorted().execute())
     }

@@ -57,9 +57,7 @@ pub fn compare(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::Ordering {
         let [x, y, z] = world.map(ticks_from_world);
         (morton(world[0], world[1]), [z, x, y])
     };
-    key(a)
-        .cmp(&key(b))
-        .then_with(|| compare_attributes(cloud, a, b))
+    key(a).cmp(&key(b)).then_with(|| compare_attributes(cloud, a, b))
 }
 
 /// Compares all attributes of two points of one cloud, extra columns included.
@@ -68,12 +66,7 @@ pub fn compare_attributes(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::O
     let fixed = |i: usize| {
         let p = cloud.point(i);
         (
-            (
-                p.source_id,
-                p.return_number,
-                p.number_of_returns,
-                p.classification,
-            ),
+            (p.source_id, p.return_number, p.number_of_returns, p.classification),
             (p.intensity, p.flags),
         )
     };
@@ -82,10 +75,7 @@ pub fn compare_attributes(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::O
         .then_with(|| fixed(a).cmp(&fixed(b)))
         .then_with(|| cloud.scan_angle_deg[a].total_cmp(&cloud.scan_angle_deg[b]))
         .then_with(|| {
-            let extra = cloud
-                .extra
-                .values()
-                .map(|c| c.value(a).total_cmp(&c.value(b)));
+            let extra = cloud.extra.values().map(|c| c.value(a).total_cmp(&c.value(b)));
             extra.fold(std::cmp::Ordering::Equal, std::cmp::Ordering::then)
         })
 }
@@ -99,12 +89,7 @@ mod tests {
     #[test]
     fn a_power_of_two_square_is_one_run() {
         let codes: Vec<u64> = (0..64)
-            .map(|i| {
-                morton(
-                    96.0 + f64::from(i % 8) * 0.125,
-                    160.0 + f64::from(i / 8) * 0.125,
-                )
-            })
+            .map(|i| morton(96.0 + f64::from(i % 8) * 0.125, 160.0 + f64::from(i / 8) * 0.125))
             .collect();
         let (low, high) = (codes.iter().min().unwrap(), codes.iter().max().unwrap());
         assert_eq!(high - low, 63);

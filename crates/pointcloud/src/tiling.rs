@@ -5,7 +5,9 @@ use serde::{Deserialize, Serialize};
 use std::fmt;
 
 /// A tile's place in its grid: column to the east, row to the north.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Default, Serialize, Deserialize,
+)]
 pub struct TileId {
     /// Column.
     pub ix: i32,
@@ -26,7 +28,8 @@ impl std::str::FromStr for TileId {
             let (ix, iy) = text.split_once('_')?;
             Some(Self { ix: ix.parse().ok()?, iy: iy.parse().ok()? })
         };
-        parse().ok_or_else(|| format!("`{text}` is no tile name; expected COLUMN_ROW such as 12_-7"))
+        parse()
+            .ok_or_else(|| format!("`{text}` is no tile name; expected COLUMN_ROW such as 12_-7"))
     }
 }
 
@@ -61,10 +64,7 @@ impl TileGrid {
     #[must_use]
     pub fn corner_m(&self, tile: TileId) -> [i64; 2] {
         let edge = i64::from(self.edge_m);
-        [
-            self.origin_m[0] + i64::from(tile.ix) * edge,
-            self.origin_m[1] + i64::from(tile.iy) * edge,
-        ]
+        [self.origin_m[0] + i64::from(tile.ix) * edge, self.origin_m[1] + i64::from(tile.iy) * edge]
     }
 
     /// The half-open world rectangle of a tile.

@@ -1,0 +1,140 @@
+//! One file per kind of artefact: its wire form, its version, and when to raise it.
+//!
+//! Raise a kind's `VERSION` whenever the meaning or the bytes of its payload change; add a golden
+//! file of the new version under `golden/` (`cargo test -p timberline-artefact -- --ignored
+//! write_golden_files` makes it) and keep the old one, which must then be refused by name.
+
+pub mod crown_models;
+pub mod ground_model;
+pub mod ground_points;
+pub mod heights;
+pub mod labels;
+pub mod outputs;
+pub mod points;
+pub mod shards;
+pub mod trees;
+pub mod treetops;
+
+use crate::container::ContainerWriter;
+use crate::{Error, Header, Opened, codec};
+use serde::{Serialize, de::DeserializeOwned};
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::Path;
+
+pub use crown_models::{CrownModel, CrownModels, CrownShape, CrownStatus};
+pub use ground_model::{GroundModel, HardyPatch};
+pub use ground_points::GroundPoints;
+pub use heights::Heights;
+pub use labels::Labels;
+pub use outputs::{OutputFile, Outputs};
+pub use points::PointTile;
+pub use shards::Shards;
+pub use trees::{PositionSource, Tree, TreeFlag, Trees};
+pub use treetops::{Treetop, Treetops};
+
+/// A kind of artefact.
+pub trait Kind: Sized {
+    /// Its name in headers, pipelines and messages.
+    const NAME: &'static str;
+    /// Version of its payload.
+    const VERSION: u32;
+    /// Ending of its files, without the dot.
+    const EXTENSION: &'static str;
+    /// What it is, in a line.
+    const SUMMARY: &'static str;
+
+    /// Writes the whole file.
+    ///
+    /// # Errors
+    /// [`Error::Encode`] or the file's error.
+    fn encode(&self, header: &Header, out: &mut File) -> Result<(), Error>;
+
+    /// Reads the payload of a file whose header announces this kind and version.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`].
+    fn decode(path: &Path, opened: &mut Opened) -> Result<Self, Error>;
+}
+
+/// Ending of table artefacts.
+pub const TABLE_EXTENSION: &str = "tmbr";
+
+/// Writes a table: bincode in a container.
+fn encode_table<T: Serialize>(
+    kind: &'static str,
+    value: &T,
+    header: &Header,
+    out: &mut File,
+) -> Result<(), Error> {
+    let fail = |detail: String| Error::Encode { kind, detail };
+    let payload = codec::encode(value).map_err(fail)?;
+    let io = |error: std::io::Error| Error::Encode { kind, detail: error.to_string() };
+    let mut writer = ContainerWriter::new(BufWriter::new(out)).map_err(io)?;
+    writer.write_all(&payload).map_err(io)?;
+    writer.finish(&header.to_json()?).map(drop).map_err(io)
+}
+
+/// Reads a table.
+fn decode_table<T: DeserializeOwned>(path: &Path, opened: &mut Opened) -> Result<T, Error> {
+    match opened {
+        Opened::Container(reader) => codec::decode(&reader.payload()?)
+            .map_err(|detail| Error::corrupt(path, "payload", detail)),
+        Opened::Mcap(_) => Err(Error::corrupt(path, "payload", "a table inside an MCAP file")),
+    }
+}
+
+/// Implements [`Kind`] for a table.
+macro_rules! table_kind {
+    ($type:ty, $name:literal, $version:literal, $summary:literal) => {
+        impl $crate::Kind for $type {
+            const NAME: &'static str = $name;
+            const VERSION: u32 = $version;
+            const EXTENSION: &'static str = $crate::kinds::TABLE_EXTENSION;
+            const SUMMARY: &'static str = $summary;
+
+            fn encode(
+                &self,
+                header: &$crate::Header,
+                out: &mut std::fs::File,
+            ) -> Result<(), $crate::Error> {
+                $crate::kinds::encode_table($name, self, header, out)
+            }
+
+            fn decode(
+                path: &std::path::Path,
+                opened: &mut $crate::Opened,
+            ) -> Result<Self, $crate::Error> {
+                $crate::kinds::decode_table(path, opened)
+            }
+        }
+    };
+}
+pub(crate) use table_kind;
+
+/// Name, version and summary of every kind, in the order of the pipeline.
+#[must_use]
+pub fn all() -> Vec<(&'static str, u32, &'static str)> {
+    fn row<K: Kind>() -> (&'static str, u32, &'static str) {
+        (K::NAME, K::VERSION, K::SUMMARY)
+    }
+    vec![
+        row::<Shards>(),
+        row::<PointTile>(),
+        row::<GroundPoints>(),
+        row::<GroundModel>(),
+        row::<Heights>(),
+        row::<Treetops>(),
+        row::<CrownModels>(),
+        row::<Labels>(),
+        row::<Trees>(),
+        row::<Outputs>(),
+    ]
+}
+
+/// The file ending of a kind; `None` for a name that is no kind.
+#[must_use]
+pub fn extension(kind: &str) -> Option<&'static str> {
+    let known = all().iter().any(|(name, ..)| *name == kind);
+    known.then(|| if kind == PointTile::NAME { PointTile::EXTENSION } else { TABLE_EXTENSION })
+}
