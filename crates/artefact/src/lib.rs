@@ -8,6 +8,7 @@
 //!
 //! Every artefact carries a [`Header`] that can be read without knowing its payload.
 
+pub mod alone;
 pub mod codec;
 pub mod container;
 pub mod crs;

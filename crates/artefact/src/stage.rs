@@ -386,6 +386,12 @@ impl<'a> Context<'a> {
         kinds
     }
 
+    /// Kinds emitted so far, in the order of emission (that of [`Context::publish`]).
+    #[must_use]
+    pub fn emitted_in_order(&self) -> Vec<&'static str> {
+        lock(&self.staged).iter().map(|(kind, _)| *kind).collect()
+    }
+
     fn header<K: Kind>(&self, facts: Facts) -> Header {
         Header {
             kind: K::NAME.to_owned(),

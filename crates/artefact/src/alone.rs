@@ -1,0 +1,104 @@
+//! Runs one stage outside the orchestrator: for tests, examples and for looking into one failed unit.
+
+use crate::stage::{Campaign, Context, InputFile, Inputs, Stage, StageError, Task};
+use crate::{Facts, Kind, UnitId};
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+/// A folder of artefacts made one by one, without keys.
+#[derive(Debug, Clone)]
+pub struct Alone {
+    folder: PathBuf,
+    /// What the campaign has in common.
+    pub campaign: Campaign,
+    /// The artefacts so far; a stage finds its inputs among them.
+    pub files: Vec<InputFile>,
+}
+
+impl Alone {
+    /// Begins in a folder.
+    #[must_use]
+    pub fn new(folder: &Path, campaign: Campaign) -> Self {
+        Self { folder: folder.to_path_buf(), campaign, files: Vec::new() }
+    }
+
+    /// The folder for files that campaign stages write.
+    #[must_use]
+    pub fn outputs(&self) -> PathBuf {
+        self.folder.join("outputs")
+    }
+
+    /// Puts an artefact there by hand.
+    ///
+    /// # Errors
+    /// Those of writing it.
+    pub fn put<K: Kind>(
+        &mut self,
+        unit: UnitId,
+        value: &K,
+        facts: Facts,
+    ) -> Result<PathBuf, StageError> {
+        self.record("by-hand", unit, serde_json::Value::Null, |context| {
+            context.emit(value, facts).map_err(StageError::from)
+        })
+    }
+
+    /// Runs a stage on a unit with the artefacts so far (those its declaration names, of all units)
+    /// and adds what it emits. Returns the first emitted file.
+    ///
+    /// # Errors
+    /// The stage's, or that it emitted other kinds than it declares.
+    pub fn run<S: Stage>(
+        &mut self,
+        unit: UnitId,
+        raw: Option<crate::stage::RawFile>,
+        params: &S::Params,
+    ) -> Result<PathBuf, StageError> {
+        let info = S::info();
+        let declared = |file: &&InputFile| info.inputs.iter().any(|input| input.kind == file.kind);
+        let files = self.files.iter().filter(declared).cloned().collect();
+        let inputs = Inputs::new(unit.clone(), raw, files);
+        let value = serde_json::to_value(params)?;
+        self.record(info.name, unit, value, |context| {
+            S::run(params, &inputs, context)?;
+            let mut expected = info.outputs.to_vec();
+            expected.sort_unstable();
+            let emitted = context.emitted();
+            if emitted == expected {
+                return Ok(());
+            }
+            Err(format!("stage `{}` emitted {emitted:?}, declares {expected:?}", info.name).into())
+        })
+    }
+
+    fn record(
+        &mut self,
+        stage: &str,
+        unit: UnitId,
+        params: serde_json::Value,
+        work: impl FnOnce(&Context<'_>) -> Result<(), StageError>,
+    ) -> Result<PathBuf, StageError> {
+        let task = Task {
+            key: "0".repeat(32),
+            stage: stage.to_owned(),
+            stage_version: 0,
+            unit: unit.clone(),
+            params,
+            inputs: Vec::new(),
+        };
+        let (outputs, cancel) = (self.outputs(), AtomicBool::new(false));
+        std::fs::create_dir_all(&outputs)?;
+        let context = Context::new(&task, &self.campaign, &self.folder, &outputs, &cancel);
+        work(&context)?;
+        let kinds = context.emitted_in_order();
+        let paths = context.publish()?;
+        for (kind, path) in kinds.into_iter().zip(&paths) {
+            self.files.push(InputFile {
+                kind: kind.to_owned(),
+                unit: unit.clone(),
+                path: path.clone(),
+            });
+        }
+        paths.into_iter().next().ok_or_else(|| "the stage emitted nothing".into())
+    }
+}
