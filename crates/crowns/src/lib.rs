@@ -1,1 +1,20 @@
 //! Crown models: consensus fits around treetops and L1 paraboloids over segments.
+//!
+//! * [`starsac`]: a surface around every treetop before anything is segmented.
+//! * [`surface`]: the crown's position by an L1 paraboloid over the points of one tree.
+//! * [`footprint`], [`base`]: the crown's outline and its lower end.
+//!
+//! Everything works on positions relative to a tree's apex, and on grids fixed in the world, so a
+//! crown is the same in whatever tile or frame its points were read.
+
+pub mod base;
+pub mod error;
+pub mod footprint;
+pub mod params;
+pub mod starsac;
+pub mod surface;
+pub mod window;
+
+pub use error::Error;
+pub use params::{CrownFitParams, CrownModelParams};
+pub use window::Window;
