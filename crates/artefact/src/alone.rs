@@ -38,7 +38,7 @@ impl Alone {
         value: &K,
         facts: Facts,
     ) -> Result<PathBuf, StageError> {
-        self.record("by-hand", unit, serde_json::Value::Null, |context| {
+        self.record("by-hand", &unit, serde_json::Value::Null, |context| {
             context.emit(value, facts).map_err(StageError::from)
         })
     }
@@ -59,7 +59,7 @@ impl Alone {
         let files = self.files.iter().filter(declared).cloned().collect();
         let inputs = Inputs::new(unit.clone(), raw, files);
         let value = serde_json::to_value(params)?;
-        self.record(info.name, unit, value, |context| {
+        self.record(info.name, &unit, value, |context| {
             S::run(params, &inputs, context)?;
             let mut expected = info.outputs.to_vec();
             expected.sort_unstable();
@@ -74,7 +74,7 @@ impl Alone {
     fn record(
         &mut self,
         stage: &str,
-        unit: UnitId,
+        unit: &UnitId,
         params: serde_json::Value,
         work: impl FnOnce(&Context<'_>) -> Result<(), StageError>,
     ) -> Result<PathBuf, StageError> {

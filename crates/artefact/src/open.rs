@@ -12,7 +12,7 @@ pub enum Opened {
     /// A table or model.
     Container(ContainerReader),
     /// Something to look at.
-    Mcap(McapReader),
+    Mcap(Box<McapReader>),
 }
 
 impl Opened {
@@ -25,7 +25,7 @@ impl Opened {
         let file = File::open(path).map_err(Error::io(path, "open"))?;
         file.take(8).read_to_end(&mut magic).map_err(Error::io(path, "read"))?;
         if magic == mcap_file::MAGIC {
-            McapReader::open(path).map(Self::Mcap)
+            McapReader::open(path).map(|reader| Self::Mcap(Box::new(reader)))
         } else if magic == container::MAGIC {
             ContainerReader::open(path).map(Self::Container)
         } else {

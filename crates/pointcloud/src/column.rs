@@ -79,6 +79,7 @@ impl Column {
 
     /// The value at an index as `f64` (exact for every type).
     #[must_use]
+    #[allow(clippy::useless_conversion, reason = "one arm of the macro holds f64 already")]
     pub fn value(&self, index: usize) -> f64 {
         each!(self, values => f64::from(values[index]))
     }
