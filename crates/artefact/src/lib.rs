@@ -4,7 +4,7 @@
 //! [`mcap_file`] for everything somebody may want to look at), what every kind of file holds
 //! ([`kinds`], one file a kind, each with its version), how a file is published so that a
 //! half-written one can never be taken for a whole one ([`publish`]), and what a stage is
-//! ([`stage`]). [`gather`] reads a tile together with its surroundings.
+//! ([`stage`]). [`gather()`] reads a tile together with its surroundings.
 //!
 //! Every artefact carries a [`Header`] that can be read without knowing its payload.
 

@@ -10,7 +10,7 @@ use std::path::{Path, PathBuf};
 /// An open artefact of either file format.
 pub enum Opened {
     /// A table or model.
-    Container(ContainerReader),
+    Container(Box<ContainerReader>),
     /// Something to look at.
     Mcap(Box<McapReader>),
 }
@@ -27,7 +27,7 @@ impl Opened {
         if magic == mcap_file::MAGIC {
             McapReader::open(path).map(|reader| Self::Mcap(Box::new(reader)))
         } else if magic == container::MAGIC {
-            ContainerReader::open(path).map(Self::Container)
+            ContainerReader::open(path).map(|reader| Self::Container(Box::new(reader)))
         } else {
             let found = format!("it begins with {:?}", String::from_utf8_lossy(&magic));
             Err(Error::Foreign { path: path.to_path_buf(), found })

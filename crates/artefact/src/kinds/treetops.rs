@@ -13,7 +13,7 @@ pub struct Treetops {
 /// One treetop.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct Treetop {
-    /// Tree id, see [`crate::tree_id`].
+    /// Tree id, see [`crate::tree_id()`].
     pub id: u64,
     /// Index of the apex point in its tile.
     pub point: u32,
