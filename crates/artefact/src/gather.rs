@@ -15,6 +15,8 @@ pub enum Aligned {
     Ground,
     /// Tree id, from [`Labels`].
     Tree,
+    /// Score of the tree id, from [`Labels`].
+    Score,
 }
 
 /// The points of a tile and of its surroundings, in canonical order and in the frame of the tile.
@@ -30,6 +32,8 @@ pub struct Surroundings {
     pub is_ground: Vec<bool>,
     /// Tree id, 0 for none; empty unless asked for.
     pub tree_id: Vec<u64>,
+    /// Score of the tree id, 0 to 1; empty unless asked for.
+    pub score: Vec<f32>,
     /// The tile's half-open rectangle in the world.
     pub tile_rect: Rect,
     /// The same in the frame of `cloud`.
@@ -117,6 +121,11 @@ fn add_column(
             check(Labels::NAME, labels.tree_id.len())?;
             all.tree_id.extend(index.iter().map(|&i| labels.tree_id[i as usize]));
         }
+        Aligned::Score => {
+            let labels = inputs.of_tile::<Labels>(other)?;
+            check(Labels::NAME, labels.score.len())?;
+            all.score.extend(index.iter().map(|&i| labels.score[i as usize]));
+        }
         Aligned::Ground => {
             let ground = inputs.of_tile::<GroundPoints>(other)?.ground;
             all.is_ground.extend(index.iter().map(|i| ground.binary_search(i).is_ok()));
@@ -140,6 +149,7 @@ fn sorted(all: Surroundings) -> Surroundings {
         height_m: pick(&all.height_m, &order),
         is_ground: pick(&all.is_ground, &order),
         tree_id: pick(&all.tree_id, &order),
+        score: pick(&all.score, &order),
         ..all
     }
 }

@@ -30,7 +30,7 @@ pub enum CrownStatus {
     /// The model stands.
     #[default]
     Accepted,
-    /// Too few points in the window.
+    /// Too few points in the window or on the surface.
     TooFewPoints,
     /// Outliers outnumber inliers by more than the allowed ratio.
     TooManyOutliers,
@@ -55,7 +55,7 @@ pub struct CrownModel {
     pub radius_m: f64,
     /// Grade: number of inliers.
     pub inliers: u32,
-    /// Number of outliers in the window.
+    /// Number of outliers, in the window or within the radius as the stage's parameters say.
     pub outliers: u32,
     /// Residuals within this are inliers, metres.
     pub tolerance_m: f64,

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 pub struct Labels {
     /// Tree ids; 0 for no tree.
     pub tree_id: Vec<u64>,
-    /// How sure the segmenter is, 0 to 1.
+    /// How sure the segmenter is, 0 to 1; above 0.5 for points on the crown's surface, 0 for no tree.
     pub score: Vec<f32>,
 }
 

@@ -104,7 +104,7 @@ pub struct Tree {
     pub position_m: [f64; 2],
     /// Where the position comes from.
     pub position_source: PositionSource,
-    /// Extent of the positions whose fit is nearly as good, metres; NaN without a fit.
+    /// Standard error of the position, metres (both axes together); NaN without a fit.
     pub position_uncertainty_m: f64,
     /// Semi-axes of the fitted surface one metre below its apex, metres; NaN without a fit.
     pub semi_axes_m: [f64; 2],
@@ -120,7 +120,7 @@ pub struct Tree {
     pub crown_radius_m: f64,
     /// Inliers of the crown model.
     pub inliers: u32,
-    /// Outliers in the crown model's window.
+    /// Outliers of the crown model.
     pub outliers: u32,
     /// Points labelled with the tree.
     pub points: u32,
