@@ -1,0 +1,339 @@
+//! What there is to do: units, keys, inputs.
+//!
+//! A key is known before anything runs, because it depends on the keys of the inputs and not on
+//! their contents. So the same code plans (nothing runs) and runs (stage by stage).
+
+use super::store::{Found, KEY_LEN, Store};
+use super::survey::Survey;
+use crate::config::{Pipeline, PipelineStage};
+use crate::registry::{CRS, GRID, RAW};
+use serde_json::Value;
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+use timberline_artefact::container::CONTAINER_VERSION;
+use timberline_artefact::kinds;
+use timberline_artefact::stage::{InputFile, InputSpec, RawFile, Scope, Task};
+use timberline_artefact::{InputRef, UnitId, UnitKind};
+use timberline_pointcloud::TileId;
+
+/// Where a unit of an earlier stage stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Standing {
+    /// Its artefacts are in the store.
+    Ready,
+    /// It would run first.
+    WillRun,
+    /// It is not there and will not be: it failed, or this run does not make it.
+    Absent,
+}
+
+/// A unit of an earlier stage.
+#[derive(Debug, Clone)]
+pub struct Made {
+    /// Its key.
+    pub key: String,
+    /// Where it stands.
+    pub standing: Standing,
+    /// Points in it, as far as known.
+    pub points: u64,
+    /// Tiles it holds points for (raw files).
+    pub parts: Vec<TileId>,
+}
+
+/// The units of the stages before, by position in the pipeline.
+pub type Progressed = Vec<BTreeMap<UnitId, Made>>;
+
+/// A unit to be dealt with.
+#[derive(Debug, Clone)]
+pub struct UnitPlan {
+    /// All that determines it, and its key.
+    pub task: Task,
+    /// The artefacts it reads.
+    pub files: Vec<InputFile>,
+    /// The raw file it reads.
+    pub raw: Option<RawFile>,
+    /// Points it reads.
+    pub points: u64,
+    /// Estimate of its peak memory.
+    pub memory_bytes: u64,
+    /// What the store has.
+    pub found: Found,
+    /// Inputs that are not there, as `stage/unit`; the unit cannot run when this is not empty.
+    pub absent: Vec<String>,
+    /// Inputs that a campaign stage goes on without.
+    pub losses: Vec<String>,
+    /// Tiles it would hold points for, by the extent of its raw file.
+    pub expected_parts: Vec<TileId>,
+}
+
+impl UnitPlan {
+    /// The unit.
+    #[must_use]
+    pub fn unit(&self) -> &UnitId {
+        &self.task.unit
+    }
+
+    /// Whether the store has it.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        matches!(self.found, Found::Whole(_))
+    }
+}
+
+/// Plans one stage, given the stages before it. Units come sorted.
+///
+/// # Errors
+/// What the stage says about its parameters.
+pub fn plan_stage(
+    pipeline: &Pipeline,
+    position: usize,
+    survey: &Survey,
+    store: &Store,
+    before: &Progressed,
+) -> Result<Vec<UnitPlan>, String> {
+    let planner = Planner { pipeline, position, survey, store, before };
+    planner.units().into_iter().map(|unit| planner.unit(unit)).collect()
+}
+
+struct Planner<'a> {
+    pipeline: &'a Pipeline,
+    position: usize,
+    survey: &'a Survey,
+    store: &'a Store,
+    before: &'a Progressed,
+}
+
+impl<'a> Planner<'a> {
+    fn stage(&self) -> &'a PipelineStage {
+        &self.pipeline.stages[self.position]
+    }
+
+    /// The inputs with the stage that makes them.
+    fn inputs(&self) -> impl Iterator<Item = (&'static InputSpec, usize)> {
+        let specs = self.stage().stage.info().inputs;
+        let producers = self.pipeline.producers(self.position);
+        specs.iter().zip(producers).filter_map(|(spec, from)| Some((spec, from?)))
+    }
+
+    fn kind_of(&self, position: usize) -> UnitKind {
+        self.pipeline.stages[position].stage.info().unit
+    }
+
+    fn units(&self) -> Vec<UnitId> {
+        match self.stage().stage.info().unit {
+            UnitKind::File => {
+                self.survey.files.iter().map(|file| UnitId::File(file.raw.name.clone())).collect()
+            }
+            UnitKind::Campaign => vec![UnitId::Campaign],
+            UnitKind::Tile => self.tiles().into_iter().map(UnitId::Tile).collect(),
+        }
+    }
+
+    fn tiles(&self) -> BTreeSet<TileId> {
+        let mut tiles = BTreeSet::new();
+        for (_, from) in self.inputs() {
+            for (unit, made) in &self.before[from] {
+                tiles.extend(unit.tile());
+                tiles.extend(made.parts.iter().filter(|_| made.standing != Standing::Absent));
+            }
+        }
+        tiles
+    }
+
+    fn unit(&self, unit: UnitId) -> Result<UnitPlan, String> {
+        let (stage, info) = (self.stage(), self.stage().stage.info());
+        let halo_m = stage.stage.halo_m(&stage.params)?;
+        let mut draft = Draft::default();
+        for (spec, from) in self.inputs() {
+            for (of, made) in self.sources(&unit, spec, from, halo_m) {
+                self.take(&mut draft, spec, from, of, made, &unit);
+            }
+        }
+        let file =
+            self.survey.files.iter().find(|file| unit == UnitId::File(file.raw.name.clone()));
+        if info.unit == UnitKind::File {
+            self.take_raw(&mut draft, &unit, file.map(|file| file.hash.clone()));
+        }
+        draft.refs.sort();
+        let points = file
+            .map_or(draft.points.values().copied().max().unwrap_or(0), |file| file.facts.points);
+        let task = Task {
+            key: key(stage, &draft.refs),
+            stage: info.name.to_owned(),
+            stage_version: info.version,
+            unit,
+            params: stage.params.clone(),
+            inputs: draft.refs,
+        };
+        let grid = self.survey.campaign.grid;
+        Ok(UnitPlan {
+            found: self.store.find(&info, &task.unit, &task.key),
+            memory_bytes: stage.stage.memory_bytes(&stage.params, points)?,
+            raw: file.map(|file| file.raw.clone()),
+            expected_parts: file
+                .zip(grid)
+                .map(|(file, grid)| file.tiles(&grid))
+                .unwrap_or_default(),
+            task,
+            files: draft.files,
+            points,
+            absent: draft.absent,
+            losses: draft.losses,
+        })
+    }
+
+    /// The units of an earlier stage that a unit reads.
+    fn sources(
+        &self,
+        unit: &UnitId,
+        spec: &InputSpec,
+        from: usize,
+        halo_m: f64,
+    ) -> Vec<(&'a UnitId, &'a Made)> {
+        let all = self.before[from].iter();
+        let Some(tile) = unit.tile().filter(|_| spec.scope != Scope::All) else {
+            let own =
+                |of: &UnitId| *unit == UnitId::Campaign || spec.scope == Scope::All || of == unit;
+            return all.filter(|(of, _)| own(of)).collect();
+        };
+        let near: BTreeSet<TileId> = match (spec.scope, self.survey.campaign.grid) {
+            (Scope::Halo, Some(grid)) => grid.neighbours(tile, halo_m).into_iter().collect(),
+            _ => BTreeSet::from([tile]),
+        };
+        let wanted = |of: &UnitId, made: &Made| match of {
+            UnitId::Tile(other) => near.contains(other),
+            UnitId::File(_) => made.parts.iter().any(|part| near.contains(part)),
+            UnitId::Campaign => true,
+        };
+        all.filter(|(of, made)| wanted(of, made)).collect()
+    }
+
+    fn take(
+        &self,
+        draft: &mut Draft,
+        spec: &InputSpec,
+        from: usize,
+        of: &UnitId,
+        made: &Made,
+        unit: &UnitId,
+    ) {
+        let producer = self.pipeline.stages[from].name();
+        if made.standing == Standing::Absent {
+            let name = format!("{producer}/{of}");
+            let lossy = *unit == UnitId::Campaign || self.kind_of(from) == UnitKind::File;
+            if lossy {
+                draft.losses.push(name)
+            } else {
+                draft.absent.push(name)
+            }
+            return;
+        }
+        let path = self.store.path(producer, of, &made.key, spec.kind);
+        draft.files.push(InputFile { kind: spec.kind.to_owned(), unit: of.clone(), path });
+        draft.refs.push(InputRef {
+            kind: spec.kind.to_owned(),
+            unit: of.clone(),
+            key: made.key.clone(),
+        });
+        // A tile reads its own part of a raw file's shards only.
+        let shared = matches!((of, unit), (UnitId::File(_), UnitId::Tile(_)));
+        let points =
+            if shared { made.points / made.parts.len().max(1) as u64 } else { made.points };
+        *draft.points.entry(spec.kind).or_default() += points;
+    }
+
+    fn take_raw(&self, draft: &mut Draft, unit: &UnitId, hash: Option<String>) {
+        let mut add = |kind: &str, unit: UnitId, key: String| {
+            draft.refs.push(InputRef { kind: kind.to_owned(), unit, key });
+        };
+        add(RAW, unit.clone(), hash.unwrap_or_default());
+        if let Some(grid) = self.survey.campaign.grid {
+            let [x, y] = grid.origin_m;
+            add(GRID, UnitId::Campaign, format!("tiles of {} m from {x}, {y}", grid.edge_m));
+        }
+        if let Some(crs) = &self.survey.campaign.crs {
+            let text = serde_json::to_string(crs).unwrap_or_default();
+            let hash = blake3::hash(text.as_bytes()).to_hex();
+            add(CRS, UnitId::Campaign, format!("{} ({})", crs.name, &hash[..8]));
+        }
+    }
+}
+
+#[derive(Default)]
+struct Draft {
+    refs: Vec<InputRef>,
+    files: Vec<InputFile>,
+    absent: Vec<String>,
+    losses: Vec<String>,
+    points: BTreeMap<&'static str, u64>,
+}
+
+/// The key of a unit: everything that determines its artefacts, hashed.
+fn key(stage: &PipelineStage, refs: &[InputRef]) -> String {
+    let info = stage.stage.info();
+    let mut hasher = blake3::Hasher::new_derive_key("timberline unit key 1");
+    let mut add = |text: &str| {
+        // The length keeps neighbouring parts apart.
+        hasher.update(&(text.len() as u64).to_le_bytes());
+        hasher.update(text.as_bytes());
+    };
+    add(info.name);
+    add(&info.version.to_string());
+    add(&CONTAINER_VERSION.to_string());
+    for (kind, version, _) in kinds::all() {
+        if info.outputs.contains(&kind) {
+            add(&format!("{kind} {version}"));
+        }
+    }
+    add(&canonical(&stage.params));
+    for InputRef { kind, unit, key } in refs {
+        add(kind);
+        add(&unit.to_string());
+        add(key);
+    }
+    hasher.finalize().to_hex()[..KEY_LEN].to_owned()
+}
+
+/// JSON with sorted keys.
+#[must_use]
+pub fn canonical(value: &Value) -> String {
+    match value {
+        Value::Object(object) => {
+            let sorted: BTreeMap<&String, &Value> = object.iter().collect();
+            let entry = |(key, value): (&String, &Value)| {
+                format!("{}:{}", Value::from(key.as_str()), canonical(value))
+            };
+            let entries: Vec<String> = sorted.into_iter().map(entry).collect();
+            format!("{{{}}}", entries.join(","))
+        }
+        Value::Array(values) => {
+            let values: Vec<String> = values.iter().map(canonical).collect();
+            format!("[{}]", values.join(","))
+        }
+        other => other.to_string(),
+    }
+}
+
+/// Where the artefacts of a planned unit are or will be.
+#[must_use]
+pub fn targets(store: &Store, stage: &PipelineStage, plan: &UnitPlan) -> Vec<PathBuf> {
+    let info = stage.stage.info();
+    info.outputs
+        .iter()
+        .map(|kind| store.path(info.name, plan.unit(), &plan.task.key, kind))
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::canonical;
+    use serde_json::json;
+
+    #[test]
+    fn canonical_json_is_sorted() {
+        assert_eq!(
+            canonical(&json!({"b": [1, 2.5, null], "a": {"d": "x\"", "c": true}})),
+            r#"{"a":{"c":true,"d":"x\""},"b":[1,2.5,null]}"#
+        );
+    }
+}
