@@ -1,0 +1,81 @@
+//! The detection of treetops.
+
+use crate::input::Ranked;
+use crate::maxima::{CELL_TICKS, Surface, cell_ticks};
+use crate::prominence::prominence;
+use crate::window::Window;
+use crate::{Error, Input, Params};
+use rayon::prelude::*;
+use timberline_pointcloud::order;
+
+/// A treetop.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Treetop {
+    /// Index of its point in the cloud.
+    pub index: u32,
+    /// Position in the world, metres.
+    pub world_m: [f64; 3],
+    /// Height above ground, metres.
+    pub height_m: f64,
+    /// Diameter or edge of the window in which nothing outranks it, metres.
+    pub window_m: f64,
+    /// Least descent on a way to anything higher, metres; see [`crate::prominence`].
+    pub prominence_m: f64,
+}
+
+/// Finds the treetops of a cloud, in the canonical order of their points.
+///
+/// The result is the same in any frame and for any order of the points (but for the indices), and
+/// whether a point is a top depends only on points within [`Params::halo_m`] of it in the plane.
+/// Cost: a sort of the points, then about constant time per half-metre cell.
+///
+/// # Errors
+/// [`Error::Params`] when [`Params::check`] finds something, [`Error::Length`] when a column does
+/// not fit the cloud, [`Error::TooManyPoints`] beyond 2^32.
+pub fn find(input: &Input<'_>, params: &Params) -> Result<Vec<Treetop>, Error> {
+    let wrong = params.check();
+    if !wrong.is_empty() {
+        return Err(Error::Params(wrong));
+    }
+    input.check()?;
+    let ranked = Ranked { input, params };
+    let edge = cell_ticks(params);
+    let fine = Surface::new(ranked, edge);
+    let candidates = maxima(&fine);
+    let coarse = if edge == CELL_TICKS { fine } else { Surface::new(ranked, CELL_TICKS) };
+    let mut tops: Vec<Treetop> = candidates
+        .into_par_iter()
+        .map(|(index, window)| treetop(&coarse, index, window))
+        .filter(|top| stands_out(params, top))
+        .collect();
+    tops.sort_by(|a, b| order::compare(input.cloud, a.index as usize, b.index as usize));
+    Ok(tops)
+}
+
+/// The points of the surface that no other of their window outranks, with their windows.
+fn maxima(surface: &Surface<'_>) -> Vec<(u32, Window)> {
+    let ranked = &surface.ranked;
+    let test = |&index: &u32| {
+        let place = index as usize;
+        let window = Window::at_height(ranked.params, ranked.height(place));
+        let is_top = ranked.may_be_top(place) && surface.is_maximum(place, window);
+        is_top.then_some((index, window))
+    };
+    surface.best.par_iter().flatten().filter_map(test).collect()
+}
+
+fn treetop(surface: &Surface<'_>, index: u32, window: Window) -> Treetop {
+    let ranked = &surface.ranked;
+    Treetop {
+        index,
+        world_m: ranked.input.cloud.world(index as usize),
+        height_m: ranked.height(index as usize),
+        window_m: window.size_m,
+        prominence_m: prominence(surface, index as usize),
+    }
+}
+
+fn stands_out(params: &Params, top: &Treetop) -> bool {
+    let least = params.min_prominence_m.max(params.min_prominence_ratio * top.height_m);
+    top.prominence_m >= least
+}
