@@ -32,6 +32,7 @@ mod input;
 mod maxima;
 mod params;
 pub mod prominence;
+pub mod stage;
 mod window;
 
 pub use detect::{Treetop, find};

@@ -3,6 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+/// Narrower windows could leave two treetops in one cell of 0.1 m and so with the same tree id.
+const SMALLEST_WINDOW_M: f64 = 0.3;
+
 /// Shape and size of the window in which a treetop must be the highest point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -43,16 +46,16 @@ pub struct Params {
     #[schemars(extend("x-source" = "variable: Popescu and Wynne 2004; square: Tittmann et al. 2011, section 3"))]
     pub window: WindowKind,
     /// Diameter of the circle or edge of the square; not used by the variable window.
-    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "Tittmann et al. 2011, section 3"))]
+    #[schemars(range(min = 0.3, max = 50.0), extend("x-unit" = "m", "x-source" = "Tittmann et al. 2011, section 3"))]
     pub window_m: f64,
     /// Variable window: diameter at height 0.
-    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "form: Popescu and Wynne 2004; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.3, max = 50.0), extend("x-unit" = "m", "x-source" = "form: Popescu and Wynne 2004; value: measured on simulated stands"))]
     pub window_base_m: f64,
     /// Variable window: growth of the diameter per metre of height.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "m/m", "x-source" = "form: Popescu and Wynne 2004; value: measured on simulated stands"))]
     pub window_per_height: f64,
     /// Variable window: largest diameter.
-    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m"))]
+    #[schemars(range(min = 0.3, max = 50.0), extend("x-unit" = "m"))]
     pub window_max_m: f64,
     /// Smallest height above ground of a treetop; 0 switches the test off.
     #[schemars(range(min = 0.0, max = 50.0), extend("x-unit" = "m", "x-source" = "the customary 2 m of airborne inventories; lidR's default too"))]
@@ -175,10 +178,10 @@ impl Params {
 
     fn ranges(&self) -> [(&'static str, f64, f64, f64); 10] {
         [
-            ("window_m", self.window_m, 0.1, 50.0),
-            ("window_base_m", self.window_base_m, 0.1, 50.0),
+            ("window_m", self.window_m, SMALLEST_WINDOW_M, 50.0),
+            ("window_base_m", self.window_base_m, SMALLEST_WINDOW_M, 50.0),
             ("window_per_height", self.window_per_height, 0.0, 1.0),
-            ("window_max_m", self.window_max_m, 0.1, 50.0),
+            ("window_max_m", self.window_max_m, SMALLEST_WINDOW_M, 50.0),
             ("min_height_m", self.min_height_m, 0.0, 50.0),
             ("max_height_m", self.max_height_m, 1.0, 10_000.0),
             ("min_prominence_m", self.min_prominence_m, 0.0, 20.0),

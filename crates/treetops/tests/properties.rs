@@ -1,5 +1,12 @@
 //! The detection against its definition, point by point, and its independence of frame, order and tile.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
 use proptest::prelude::*;
 use timberline_pointcloud::{Frame, Point, PointCloud, frame, order};
 use timberline_treetops::{Input, Params, RankBy, Returns, Treetop, WindowKind, find};
@@ -27,7 +34,7 @@ fn cloud_of(raw: &[Raw], origin_m: [i64; 3]) -> (PointCloud, Vec<f32>) {
 fn all_params() -> impl Strategy<Value = Params> {
     let window =
         prop_oneof![Just(WindowKind::Variable), Just(WindowKind::Circle), Just(WindowKind::Square)];
-    (window, 2u32..40, 0u32..4, any::<bool>(), any::<bool>()).prop_map(
+    (window, 6u32..40, 0u32..4, any::<bool>(), any::<bool>()).prop_map(
         |(window, size, support_points, first, elevation)| Params {
             window,
             window_m: f64::from(size) * 0.1,

@@ -1,5 +1,12 @@
 //! A fixed circular window against `lmf` of lidR, on its own scans.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
 mod common;
 
 use common::{near, normalised, over_tin, peer, tops};

@@ -1,0 +1,103 @@
+//! The stage over tiles: the same trees however the campaign is cut.
+
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
+use proptest::prelude::*;
+use timberline_artefact::alone::Alone;
+use timberline_artefact::kinds::{GroundPoints, Heights, PointTile, Treetop, Treetops};
+use timberline_artefact::stage::Campaign;
+use timberline_artefact::{Facts, UnitId, read, tree_id};
+use timberline_pointcloud::{Frame, Point, PointCloud, TileGrid, TileId, frame};
+use timberline_treetops::stage::TreetopsStage;
+use timberline_treetops::{Input, Params, RankBy, find};
+
+/// Points of a bumpy slope around tile borders: x, y in decimetres, z in decimetres.
+fn campaign(raw: &[(i32, i32, i32)]) -> PointCloud {
+    let mut cloud = PointCloud::new(Frame::new([4_096, 8_192, 100]));
+    for &(x, y, z) in raw {
+        let world = [
+            4_128.0 + f64::from(x) * 0.1,
+            8_224.0 + f64::from(y) * 0.1,
+            120.0 + f64::from(z) * 0.1,
+        ];
+        cloud.push_world(world.map(frame::quantise), &Point::default());
+    }
+    cloud.in_canonical_order()
+}
+
+fn height_of(cloud: &PointCloud, index: usize) -> f32 {
+    (cloud.world(index)[2] - 115.0) as f32
+}
+
+/// Runs the stage on every tile of a grid and gathers all treetops.
+fn over_tiles(cloud: &PointCloud, grid: TileGrid, params: &Params) -> Vec<Treetop> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Alone::new(folder.path(), Campaign::default());
+    let tile_of = |i: u32| {
+        let [x, y, _] = cloud.world(i as usize);
+        grid.tile_at(x, y)
+    };
+    let mut tiles: Vec<TileId> = (0..cloud.len() as u32).map(tile_of).collect();
+    tiles.sort_unstable();
+    tiles.dedup();
+    for &tile in &tiles {
+        let own: Vec<u32> = (0..cloud.len() as u32).filter(|&i| tile_of(i) == tile).collect();
+        let part = cloud.select(&own).in_frame(PointTile::frame(&grid, tile, 100.0));
+        let facts = Facts { frame: Some(part.frame), grid: Some(grid), ..Facts::default() };
+        let facts = facts.count("points", part.len());
+        let height_m = (0..part.len()).map(|i| height_of(&part, i)).collect();
+        let unit = UnitId::Tile(tile);
+        store.put(unit.clone(), &PointTile { cloud: part }, facts.clone()).unwrap();
+        store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
+        store.put(unit, &GroundPoints::default(), facts).unwrap();
+    }
+    let run = |tile: &TileId| {
+        let path = store.run::<TreetopsStage>(UnitId::Tile(*tile), None, params).unwrap();
+        read::<Treetops>(&path).unwrap().1.tops
+    };
+    let mut tops: Vec<Treetop> = tiles.iter().flat_map(run).collect();
+    tops.sort_by_key(|top| top.id);
+    tops
+}
+
+/// What tells a treetop apart, its index in the tile aside.
+fn facts_of(tops: &[Treetop]) -> Vec<(u64, [f64; 3], f64, f64, f64)> {
+    tops.iter().map(|t| (t.id, t.apex_m, t.height_m, t.window_m, t.prominence_m)).collect()
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(12))]
+
+    #[test]
+    fn cut_as_you_like(
+        raw in prop::collection::vec((-320i32..320, -320i32..320, 0i32..150), 100..400),
+        origin in -40i64..40, elevation in any::<bool>(),
+    ) {
+        let cloud = campaign(&raw);
+        let rank_by = if elevation { RankBy::Elevation } else { RankBy::Height };
+        let params = Params { rank_by, support_radius_m: 5.0, ..Params::default() };
+        let height_m: Vec<f32> = (0..cloud.len()).map(|i| height_of(&cloud, i)).collect();
+        let mut whole: Vec<Treetop> = find(&Input::new(&cloud, &height_m), &params)
+            .unwrap()
+            .iter()
+            .map(|top| Treetop {
+                id: tree_id(top.world_m[0], top.world_m[1]),
+                point: top.index,
+                apex_m: top.world_m,
+                height_m: top.height_m,
+                window_m: top.window_m,
+                prominence_m: top.prominence_m,
+            })
+            .collect();
+        whole.sort_by_key(|top| top.id);
+        for (edge_m, origin_m) in [(32, [0, 0]), (16, [origin, -origin]), (64, [origin, 0])] {
+            let grid = TileGrid::new(edge_m, origin_m).unwrap();
+            prop_assert_eq!(facts_of(&over_tiles(&cloud, grid, &params)), facts_of(&whole));
+        }
+    }
+}
