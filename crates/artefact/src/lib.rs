@@ -13,6 +13,7 @@ pub mod codec;
 pub mod container;
 pub mod crs;
 pub mod error;
+pub mod folder;
 pub mod gather;
 pub mod header;
 pub mod kinds;
@@ -25,6 +26,7 @@ pub mod tree_id;
 
 pub use crs::Crs;
 pub use error::Error;
+pub use folder::OutputFolder;
 pub use gather::{Aligned, Surroundings, gather};
 pub use header::{Facts, Header, InputRef, UnitId, UnitKind, Warning};
 pub use kinds::Kind;

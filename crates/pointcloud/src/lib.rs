@@ -25,6 +25,7 @@ pub mod frame;
 pub mod grid;
 pub mod nearest;
 pub mod order;
+pub mod sites;
 pub mod tiling;
 
 pub use bounds::{Bounds3, Rect};
@@ -34,4 +35,5 @@ pub use error::Error;
 pub use frame::Frame;
 pub use grid::{Grid2, Grid3};
 pub use nearest::{Nearest2, Nearest3};
+pub use sites::Footprint;
 pub use tiling::{TileGrid, TileId};
