@@ -65,4 +65,32 @@ pub struct CrownModel {
     pub status: CrownStatus,
 }
 
+impl CrownModel {
+    /// The coefficients of h = b1 r + b2 r^2, as which every form can be written.
+    #[must_use]
+    pub fn coefficients(&self) -> [f64; 2] {
+        let [first, second] = self.parameters;
+        match self.shape {
+            CrownShape::Paraboloid => [0.0, -first],
+            CrownShape::Cone => [1.0 / first.sqrt(), 0.0],
+            CrownShape::Blend => [1.0 - first, first],
+            CrownShape::Mixed => [first, second],
+        }
+    }
+}
+
 table_kind!(CrownModels, "crown-models", 1, "consensus crown models around the treetops of a tile");
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_form_has_two_coefficients() {
+        let of = |shape, parameters| CrownModel { shape, parameters, ..CrownModel::default() };
+        assert_eq!(of(CrownShape::Paraboloid, [-0.5, 0.0]).coefficients(), [0.0, 0.5]);
+        assert_eq!(of(CrownShape::Cone, [0.25, 0.0]).coefficients(), [2.0, 0.0]);
+        assert_eq!(of(CrownShape::Blend, [0.25, 0.0]).coefficients(), [0.75, 0.25]);
+        assert_eq!(of(CrownShape::Mixed, [0.3, 0.1]).coefficients(), [0.3, 0.1]);
+    }
+}
