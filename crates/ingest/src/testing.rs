@@ -1,0 +1,128 @@
+//! Small LAS files made byte by byte, for tests of what no writer would write.
+
+use crate::format::Layout;
+
+/// Builds the bytes of an uncompressed LAS file.
+#[derive(Debug, Clone)]
+pub(crate) struct LasBytes {
+    version: (u8, u8),
+    format: u8,
+    extra_len: u16,
+    encoding: u16,
+    scale: f64,
+    vlrs: Vec<u8>,
+    vlr_count: u32,
+    evlrs: Vec<u8>,
+    evlr_count: u32,
+    records: Vec<Vec<u8>>,
+}
+
+impl LasBytes {
+    pub(crate) fn new(version: (u8, u8), format: u8) -> Self {
+        Self {
+            version,
+            format,
+            extra_len: 0,
+            encoding: 0,
+            scale: 0.01,
+            vlrs: Vec::new(),
+            vlr_count: 0,
+            evlrs: Vec::new(),
+            evlr_count: 0,
+            records: Vec::new(),
+        }
+    }
+
+    pub(crate) fn extra_len(mut self, len: u16) -> Self {
+        self.extra_len = len;
+        self
+    }
+
+    pub(crate) fn encoding(mut self, bits: u16) -> Self {
+        self.encoding = bits;
+        self
+    }
+
+    pub(crate) fn record_len(&self) -> usize {
+        usize::from(Layout::of(self.format).unwrap().len + self.extra_len)
+    }
+
+    fn head(user: &str, id: u16) -> Vec<u8> {
+        let mut head = vec![0; 20];
+        head[2..2 + user.len()].copy_from_slice(user.as_bytes());
+        head[18..20].copy_from_slice(&id.to_le_bytes());
+        head
+    }
+
+    pub(crate) fn vlr(mut self, user: &str, id: u16, data: &[u8]) -> Self {
+        self.vlrs.extend(Self::head(user, id));
+        self.vlrs.extend((data.len() as u16).to_le_bytes());
+        self.vlrs.extend([0; 32]);
+        self.vlrs.extend(data);
+        self.vlr_count += 1;
+        self
+    }
+
+    pub(crate) fn evlr(mut self, user: &str, id: u16, data: &[u8]) -> Self {
+        self.evlrs.extend(Self::head(user, id));
+        self.evlrs.extend((data.len() as u64).to_le_bytes());
+        self.evlrs.extend([0; 32]);
+        self.evlrs.extend(data);
+        self.evlr_count += 1;
+        self
+    }
+
+    /// Adds points at (i, 2 i, 3 i) hundredths, single returns.
+    pub(crate) fn points(mut self, count: i32) -> Self {
+        for i in 0..count {
+            let record = self.record([i, 2 * i, 3 * i]);
+            self.records.push(record);
+        }
+        self
+    }
+
+    /// A record with a position and return 1 of 1.
+    pub(crate) fn record(&self, xyz: [i32; 3]) -> Vec<u8> {
+        let mut record = vec![0; self.record_len()];
+        for axis in 0..3 {
+            record[4 * axis..4 * axis + 4].copy_from_slice(&xyz[axis].to_le_bytes());
+        }
+        record[14] = if self.format >= 6 { 0x11 } else { 0x09 };
+        record
+    }
+
+    pub(crate) fn push(mut self, record: Vec<u8>) -> Self {
+        self.records.push(record);
+        self
+    }
+
+    pub(crate) fn build(self) -> Vec<u8> {
+        let header_len: usize = match self.version.1 {
+            0..=2 => 227,
+            3 => 235,
+            _ => 375,
+        };
+        let points_at = header_len + self.vlrs.len();
+        let points: Vec<u8> = self.records.concat();
+        let mut out = vec![0; header_len];
+        let mut put = |at: usize, bytes: &[u8]| {
+            if at + bytes.len() <= header_len {
+                out[at..at + bytes.len()].copy_from_slice(bytes);
+            }
+        };
+        put(0, b"LASF");
+        put(6, &self.encoding.to_le_bytes());
+        put(24, &[self.version.0, self.version.1]);
+        put(94, &(header_len as u16).to_le_bytes());
+        put(96, &(points_at as u32).to_le_bytes());
+        put(100, &self.vlr_count.to_le_bytes());
+        put(104, &[self.format]);
+        put(105, &(self.record_len() as u16).to_le_bytes());
+        put(107, &(self.records.len() as u32).to_le_bytes());
+        (0..3).for_each(|axis| put(131 + 8 * axis, &self.scale.to_le_bytes()));
+        put(235, &((points_at + points.len()) as u64).to_le_bytes());
+        put(243, &self.evlr_count.to_le_bytes());
+        put(247, &(self.records.len() as u64).to_le_bytes());
+        [out, self.vlrs, points, self.evlrs].concat()
+    }
+}

@@ -1,0 +1,156 @@
+//! Counts of points in world-fixed voxels, by which isolated points are told.
+//!
+//! The counts of a tile's surroundings are the sum over all files, so the answer depends neither on
+//! the tiles nor on the sequence of files. After the isolated voxel filter of lidR (`ivf`) and
+//! LAStools (`lasnoise`), with one more condition that keeps sparse surveys whole.
+
+use timberline_pointcloud::PointCloud;
+
+/// Edge of a voxel: lasnoise's default step (LAStools; lidR's `ivf` has 5 m).
+pub(crate) const VOXEL_M: f64 = 4.0;
+
+/// A voxel: index of its cell along x, y, z.
+pub(crate) type Voxel = [i32; 3];
+
+/// How many points must lie in the columns around, for each point that makes a voxel isolated.
+const COLUMN_FACTOR: u64 = 10;
+
+const WITHHELD: u8 = 1 << 2;
+
+/// Whether a point counts as company for others: neither withheld nor called noise by the supplier.
+pub(crate) fn is_company(classification: u8, flags: u8) -> bool {
+    flags & WITHHELD == 0 && !matches!(classification, 7 | 18)
+}
+
+/// The voxel of a world position.
+pub(crate) fn voxel_of(world_m: [f64; 3]) -> Voxel {
+    world_m.map(|value| (value / VOXEL_M).floor() as i32)
+}
+
+/// Counts the points of a cloud by voxel, sorted.
+pub(crate) fn count(cloud: &PointCloud) -> Vec<(Voxel, u32)> {
+    let mut runs: Vec<(Voxel, u32)> = Vec::new();
+    for index in 0..cloud.len() {
+        if !is_company(cloud.classification[index], cloud.flags[index]) {
+            continue;
+        }
+        let voxel = voxel_of(cloud.world(index));
+        match runs.last_mut() {
+            Some((last, count)) if *last == voxel => *count += 1,
+            _ => runs.push((voxel, 1)),
+        }
+    }
+    merge(runs)
+}
+
+/// Sorts counts and adds up those of one voxel.
+pub(crate) fn merge(mut counts: Vec<(Voxel, u32)>) -> Vec<(Voxel, u32)> {
+    counts.sort_unstable_by_key(|entry| entry.0);
+    counts.dedup_by(|next, kept| {
+        let same = next.0 == kept.0;
+        if same {
+            kept.1 = kept.1.saturating_add(next.1);
+        }
+        same
+    });
+    counts
+}
+
+/// How far around a tile points can share the neighbourhood of a voxel with points of the tile.
+pub(crate) const REACH_M: f64 = 2.0 * VOXEL_M;
+
+/// Answers which voxels are isolated.
+#[derive(Debug, Clone)]
+pub(crate) struct Isolation {
+    /// Sorted by x, y, z.
+    counts: Vec<(Voxel, u32)>,
+    limit: u64,
+}
+
+impl Isolation {
+    /// Takes the merged counts of a neighbourhood and the largest number of points that is isolated.
+    pub(crate) fn new(counts: Vec<(Voxel, u32)>, limit: u32) -> Self {
+        Self { counts, limit: u64::from(limit) }
+    }
+
+    /// Whether a voxel and the 26 around it hold few points although its columns hold many.
+    pub(crate) fn is_isolated(&self, voxel: Voxel) -> bool {
+        let [x, y, z] = voxel;
+        let near = |low: i32, high: i32| {
+            let mut sum = 0;
+            for dx in -1..=1 {
+                for dy in -1..=1 {
+                    let column = [x.saturating_add(dx), y.saturating_add(dy)];
+                    sum += self.sum([column[0], column[1], low], [column[0], column[1], high]);
+                }
+            }
+            sum
+        };
+        let cube = near(z.saturating_sub(1), z.saturating_add(1));
+        cube <= self.limit && near(i32::MIN, i32::MAX) >= COLUMN_FACTOR * (self.limit + 1)
+    }
+
+    /// Points in the voxels from one to another of the same column.
+    fn sum(&self, low: Voxel, high: Voxel) -> u64 {
+        let first = self.counts.partition_point(|entry| entry.0 < low);
+        let run = self.counts[first..].iter().take_while(|entry| entry.0 <= high);
+        run.map(|entry| u64::from(entry.1)).sum()
+    }
+
+    /// Points in one voxel.
+    pub(crate) fn own(&self, voxel: Voxel) -> u64 {
+        self.sum(voxel, voxel)
+    }
+
+    /// The limit above which a voxel alone is company enough.
+    pub(crate) fn limit(&self) -> u64 {
+        self.limit
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timberline_pointcloud::Point;
+
+    fn forest(extra: &[[f64; 3]]) -> PointCloud {
+        let mut cloud = PointCloud::default();
+        for i in 0..20 {
+            for j in 0..20 {
+                let at = [f64::from(i), f64::from(j), f64::from((i * 7 + j * 3) % 15)];
+                cloud.push_world(at, &Point::default());
+            }
+        }
+        extra.iter().for_each(|at| cloud.push_world(*at, &Point::default()));
+        cloud
+    }
+
+    #[test]
+    fn birds_and_multipath_are_isolated_treetops_are_not() {
+        let cloud = forest(&[[10.0, 10.0, 90.0], [5.0, 5.0, -60.0], [8.0, 8.0, 19.0]]);
+        let isolation = Isolation::new(count(&cloud), 5);
+        let isolated = |index: usize| isolation.is_isolated(voxel_of(cloud.world(index)));
+        assert!(isolated(400) && isolated(401));
+        assert!(!isolated(402));
+        assert!((0..400).all(|index| !isolated(index)));
+    }
+
+    #[test]
+    fn a_sparse_cloud_is_left_alone() {
+        let mut cloud = PointCloud::default();
+        (0..50).for_each(|i| cloud.push_world([f64::from(i) * 40.0, 0.0, 0.0], &Point::default()));
+        let isolation = Isolation::new(count(&cloud), 5);
+        assert!((0..50).all(|i| !isolation.is_isolated(voxel_of(cloud.world(i)))));
+    }
+
+    #[test]
+    fn noise_by_class_is_no_company() {
+        let mut cloud = forest(&[]);
+        for _ in 0..9 {
+            let noise = Point { classification: 7, ..Point::default() };
+            cloud.push_world([10.0, 10.0, 90.0], &noise);
+        }
+        let isolation = Isolation::new(count(&cloud), 5);
+        assert!(isolation.is_isolated(voxel_of([10.0, 10.0, 90.0])));
+    }
+}
