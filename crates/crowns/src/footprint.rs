@@ -12,7 +12,7 @@ pub struct Footprint {
     pub area_m2: f64,
     /// Largest distance between two corners, m.
     pub max_diameter_m: f64,
-    /// Width averaged over all directions, m: the perimeter over π (Cauchy).
+    /// Diameter of the circle of the same area, m.
     pub mean_diameter_m: f64,
 }
 
@@ -62,7 +62,7 @@ fn measured(corners: &[[i64; 2]]) -> Footprint {
         (dx * dx + dy * dy).sqrt() * TICK_M
     };
     let twice: i128 = (0..corners.len()).map(|i| cross(first, corners[i], next(i))).sum();
-    let perimeter: f64 = (0..corners.len()).map(|i| distance(corners[i], next(i))).sum();
+    let area_m2 = 0.5 * twice as f64 * TICK_M * TICK_M;
     let widest = corners
         .iter()
         .enumerate()
@@ -73,9 +73,9 @@ fn measured(corners: &[[i64; 2]]) -> Footprint {
             .iter()
             .map(|corner| corner.map(|tick| tick as f64 / TICKS_PER_M))
             .collect(),
-        area_m2: 0.5 * twice as f64 * TICK_M * TICK_M,
+        area_m2,
         max_diameter_m: widest,
-        mean_diameter_m: perimeter / std::f64::consts::PI,
+        mean_diameter_m: 2.0 * (area_m2 / std::f64::consts::PI).sqrt(),
     }
 }
 
@@ -92,7 +92,7 @@ mod tests {
         assert_eq!(found.corners, [[0.0, 0.0], [2.0, 0.0], [2.0, 2.0], [0.0, 2.0]]);
         assert!((found.area_m2 - 4.0).abs() < 1e-9);
         assert!((found.max_diameter_m - 8f64.sqrt()).abs() < 1e-9);
-        assert!((found.mean_diameter_m - 8.0 / std::f64::consts::PI).abs() < 1e-9);
+        assert!((found.mean_diameter_m - 4.0 / std::f64::consts::PI.sqrt()).abs() < 1e-9);
     }
 
     #[test]

@@ -180,7 +180,7 @@ impl CrownModelParams {
 
     /// What ranges of single fields do not catch.
     #[must_use]
-    pub fn check(&self) -> Vec<String> {
+    pub fn faults(&self) -> Vec<String> {
         let mut faults = Vec::new();
         if self.tolerance_m >= 0.5 * self.window_m {
             faults.push(format!(
@@ -237,7 +237,7 @@ impl Default for CrownFitParams {
 impl CrownFitParams {
     /// What ranges of single fields do not catch.
     #[must_use]
-    pub fn check(&self) -> Vec<String> {
+    pub fn faults(&self) -> Vec<String> {
         if self.smallest_axis_m < self.largest_axis_m {
             return Vec::new();
         }
@@ -262,9 +262,9 @@ mod tests {
 
     #[test]
     fn defaults_are_sound() {
-        assert!(CrownModelParams::default().check().is_empty());
-        assert!(CrownFitParams::default().check().is_empty());
+        assert!(CrownModelParams::default().faults().is_empty());
+        assert!(CrownFitParams::default().faults().is_empty());
         let crossed = CrownFitParams { smallest_axis_m: 4.0, ..CrownFitParams::default() };
-        assert_eq!(crossed.check().len(), 1);
+        assert_eq!(crossed.faults().len(), 1);
     }
 }

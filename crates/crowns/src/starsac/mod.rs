@@ -27,12 +27,10 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum Rejection {
-    /// Fewer points in the window than inliers asked for.
+    /// Fewer points in the window or on the surface than inliers asked for.
     TooFewPoints,
     /// No surface opens downward through any point tried.
     NoModel,
-    /// The grade is below the limit.
-    TooFewInliers,
     /// Too many outliers per inlier.
     TooManyOutliers,
 }
@@ -42,9 +40,8 @@ impl Rejection {
     #[must_use]
     pub fn reason(self) -> &'static str {
         match self {
-            Self::TooFewPoints => "too few points around the treetop",
+            Self::TooFewPoints => "too few points on a crown around the treetop",
             Self::NoModel => "no surface opens downward from the treetop",
-            Self::TooFewInliers => "too few points on the crown's surface",
             Self::TooManyOutliers => "too many points off the crown's surface",
         }
     }
@@ -123,7 +120,7 @@ pub fn fit_window(window: &Window, params: &CrownModelParams, seed: u64) -> Outc
 
 fn judge(crown: &CrownModel, params: &CrownModelParams) -> Option<Rejection> {
     if crown.grade() < params.min_inliers {
-        Some(Rejection::TooFewInliers)
+        Some(Rejection::TooFewPoints)
     } else if crown.outlier_ratio() > params.max_outlier_ratio {
         Some(Rejection::TooManyOutliers)
     } else {

@@ -143,7 +143,7 @@ impl Rows {
     /// p >= r, p >= 0 and the bounds on the shape; the prior follows by [`Self::prior`].
     fn new(scaled: &Scaled) -> Self {
         let n = scaled.cells.len();
-        let mut columns: Vec<Vec<(usize, f64)>> = vec![Vec::with_capacity(n + 8); UNKNOWNS];
+        let mut columns: Vec<Vec<(usize, f64)>> = vec![Vec::new(); UNKNOWNS];
         let mut b: Vec<f64> = scaled.cells.iter().map(|cell| cell[2]).collect();
         for (i, &[x, y, _]) in scaled.cells.iter().enumerate() {
             for (column, value) in columns.iter_mut().zip([x * x + y * y, x, y, 1.0]) {

@@ -14,6 +14,7 @@ mod paraboloid;
 mod rank;
 mod scale;
 mod thinning;
+mod uncertainty;
 
 pub use equal_axis::EqualAxis;
 pub use paraboloid::{Paraboloid, Shape};
@@ -117,6 +118,9 @@ impl Flag {
 pub struct Fit {
     /// The tree's position in the frame of the problem, m.
     pub position: [f64; 2],
+    /// Standard error of the position, both axes together, m; see [`fit`]. `None` without a surface
+    /// or without more cells than unknowns.
+    pub standard_error_m: Option<f64>,
     /// The solver's result; `None` when the crown does not determine a surface.
     pub solution: Option<Solution>,
     /// What is remarkable, sorted.
@@ -131,6 +135,10 @@ const ON_THE_EDGE_M: f64 = 1e-5;
 
 /// Fits a crown's surface and position.
 ///
+/// The standard error is the asymptotic one of L1 regression (Koenker and Bassett 1978), carried
+/// over to the centre; it knows nothing of the prior box, so with [`Flag::PriorActive`] it is that
+/// of the free centre.
+///
 /// # Errors
 /// Input that means nothing: coordinates that are not finite, no cells, bounds no surface can
 /// meet, a negative prior box; and [`Error::Solver`] when the solver gives up. A crown that does
@@ -139,7 +147,7 @@ pub fn fit(problem: &Problem<'_>, solver: &impl Solver) -> Result<Fit, Error> {
     let highest = check(problem)?;
     if rank::rank(problem.cells, solver) < solver.unknowns() {
         let flags = vec![Flag::Underdetermined];
-        return Ok(Fit { position: highest, solution: None, flags });
+        return Ok(Fit { position: highest, standard_error_m: None, solution: None, flags });
     }
     let solution = solver.solve(problem)?;
     let position = solution.paraboloid.centre();
@@ -150,7 +158,8 @@ pub fn fit(problem: &Problem<'_>, solver: &impl Solver) -> Result<Fit, Error> {
     flag(problem.prior.is_some_and(|prior| on_the_edge(&prior, position)), Flag::PriorActive);
     flag(outside(problem.cells, position), Flag::CentreOutsideData);
     flag(largest_azimuth_gap(problem.cells, position) > MAX_AZIMUTH_GAP, Flag::OneSided);
-    Ok(Fit { position, solution: Some(solution), flags })
+    let standard_error_m = uncertainty::standard_error(problem.cells, &solution.paraboloid, solver);
+    Ok(Fit { position, standard_error_m, solution: Some(solution), flags })
 }
 
 /// Checks a problem's numbers and returns the position of its highest cell (the first of equals).
