@@ -98,6 +98,9 @@ pub struct CrsFile {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TilesFile {
+    /// Points a tile should hold about, where `edge_m` is not given [default: 150000].
+    #[schemars(range(min = 1000, max = 100_000_000))]
+    pub points: Option<u32>,
     /// Edge of a tile.
     #[schemars(range(min = 4, max = 4096), extend("x-unit" = "m"))]
     pub edge_m: Option<u32>,
@@ -114,6 +117,8 @@ pub struct FieldFile {
     pub plots: Option<PathBuf>,
     /// Trees on the plots, a CSV file.
     pub trees: Option<PathBuf>,
+    /// Stands with their boundaries, a CSV file.
+    pub stands: Option<PathBuf>,
 }
 
 /// `[truth]`: what a simulated or fully measured stand really holds.
@@ -122,7 +127,7 @@ pub struct FieldFile {
 pub struct TruthFile {
     /// Every tree, a CSV file (columns: see `cargo xtask evaluate --help`).
     pub trees: Option<PathBuf>,
-    /// Terrain, a CSV file of x, y, z.
+    /// Terrain, an ESRI ASCII raster.
     pub dtm: Option<PathBuf>,
 }
 

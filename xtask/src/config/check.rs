@@ -248,6 +248,7 @@ mod tests {
     enum Mode {
         /// First.
         Auto,
+        /// Second.
         UseAll,
     }
 

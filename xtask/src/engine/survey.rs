@@ -10,15 +10,22 @@ use timberline_artefact::Crs;
 use timberline_artefact::stage::{self, RawFile};
 use timberline_pointcloud::{Rect, TileGrid, TileId};
 
+/// Points of a tile unless the campaign says otherwise: the block of Tittmann et al. 2011, section 3.
+pub const TILE_POINTS: u32 = 150_000;
+
 /// What the header of a raw file says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FileFacts {
     /// Points in it.
     pub points: u64,
-    /// Its extent in metres.
-    pub rect_m: Rect,
+    /// Its extent in metres, if the header gives one.
+    pub rect_m: Option<Rect>,
+    /// Points per square metre of covered ground, if they can be told.
+    pub density_per_m2: Option<f64>,
     /// Its CRS, if it names one.
     pub crs: Option<Crs>,
+    /// What the user should know about it.
+    pub notes: Vec<String>,
 }
 
 /// Looks at raw files; the engine does not know their formats.
@@ -29,8 +36,8 @@ pub trait Surveyor: Send + Sync {
     /// Why the file cannot be used.
     fn look(&self, path: &Path) -> Result<FileFacts, String>;
 
-    /// Edge in metres of the tiles for files like these.
-    fn tile_edge_m(&self, files: &[FileFacts]) -> u32;
+    /// Edge in metres of tiles of about so many points for files like these.
+    fn tile_edge_m(&self, files: &[FileFacts], points: u32) -> u32;
 }
 
 /// A raw file that can be used.
@@ -50,7 +57,7 @@ impl Surveyed {
     /// The tiles its extent touches: at least those it has points in.
     #[must_use]
     pub fn tiles(&self, grid: &TileGrid) -> Vec<TileId> {
-        let Rect { min, max } = self.facts.rect_m;
+        let Some(Rect { min, max }) = self.facts.rect_m else { return Vec::new() };
         let (low, high) = (grid.tile_at(min[0], min[1]), grid.tile_at(max[0], max[1]));
         let columns = low.ix..=high.ix;
         columns.flat_map(|ix| (low.iy..=high.iy).map(move |iy| TileId { ix, iy })).collect()
@@ -150,7 +157,8 @@ fn layout(
     let grid = if facts.is_empty() {
         None
     } else {
-        let edge = tiles.edge_m.unwrap_or_else(|| surveyor.tile_edge_m(&facts));
+        let points = tiles.points.unwrap_or(TILE_POINTS);
+        let edge = tiles.edge_m.unwrap_or_else(|| surveyor.tile_edge_m(&facts, points));
         Some(
             TileGrid::new(edge, tiles.origin_m.unwrap_or([0, 0]))
                 .map_err(|error| error.to_string())?,

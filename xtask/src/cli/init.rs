@@ -1,0 +1,167 @@
+//! `init`: a campaign.toml for a folder of scans.
+
+use super::out;
+use super::{DONE, Program, Usage};
+use crate::config::Platform;
+use crate::config::campaign::FILE_NAME;
+use crate::engine::progress::short;
+use crate::engine::survey::FileFacts;
+use crate::engine::workdir::{DEFAULT_NAME, walk};
+use anyhow::{Context, Result};
+use rayon::prelude::*;
+use std::collections::BTreeSet;
+use std::path::{Path, PathBuf};
+use timberline_artefact::publish::write_atomic;
+
+/// Arguments of `init`.
+#[derive(Debug, clap::Args)]
+pub struct Args {
+    /// Folder of the campaign; it is made if need be
+    folder: PathBuf,
+    /// Scans that lie elsewhere; without any, those in the folder
+    scans: Vec<PathBuf>,
+    /// Name of the campaign [default: that of the folder]
+    #[arg(long)]
+    name: Option<String>,
+    /// How the scans were taken
+    #[arg(long, value_parser = ["als", "uls", "tls", "mls"], default_value = "als")]
+    platform: String,
+    /// Overwrite a campaign.toml that is there
+    #[arg(long)]
+    force: bool,
+}
+
+struct Scan {
+    /// As it stands in the campaign file.
+    pattern: String,
+    facts: Result<FileFacts, String>,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When there are no scans, or a campaign.toml is in the way.
+pub fn run(program: &Program, args: &Args) -> Result<u8> {
+    let target = args.folder.join(FILE_NAME);
+    if target.exists() && !args.force {
+        return Err(
+            Usage(format!("{} is there already; --force overwrites it", target.display())).into()
+        );
+    }
+    let scans = look(program, args)?;
+    if scans.iter().all(|scan| scan.facts.is_err()) {
+        report(&scans);
+        let place = args.folder.display();
+        return Err(Usage(format!("no usable .las, .laz or .copc.laz file in {place}")).into());
+    }
+    std::fs::create_dir_all(&args.folder)
+        .with_context(|| format!("cannot make {}", args.folder.display()))?;
+    write_atomic(&target, text(args, &scans)?.as_bytes())?;
+    report(&scans);
+    out::line(&target.display().to_string());
+    out::talk(&format!(
+        "next: cargo xtask run pipelines/als-inventory.toml --campaign {}",
+        args.folder.display()
+    ));
+    Ok(DONE)
+}
+
+fn look(program: &Program, args: &Args) -> Result<Vec<Scan>> {
+    let mut paths: Vec<(String, PathBuf)> = Vec::new();
+    if args.scans.is_empty() {
+        walk(&args.folder, &mut |path| {
+            let inner = path.strip_prefix(&args.folder).unwrap_or(path);
+            if is_scan(path) && !inner.starts_with(DEFAULT_NAME) {
+                paths.push((inner.to_string_lossy().replace('\\', "/"), path.to_owned()));
+            }
+        });
+    }
+    for scan in &args.scans {
+        let whole = scan.canonicalize().with_context(|| format!("{}", scan.display()))?;
+        paths.push((whole.to_string_lossy().into_owned(), whole));
+    }
+    let scan =
+        |(pattern, path): (String, PathBuf)| Scan { pattern, facts: program.surveyor.look(&path) };
+    Ok(paths.into_par_iter().map(scan).collect())
+}
+
+fn is_scan(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|ending| ["las", "laz"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+fn report(scans: &[Scan]) {
+    for scan in scans {
+        match &scan.facts {
+            Ok(facts) => {
+                let crs = facts.crs.as_ref().map_or("no CRS", |crs| crs.name.as_str());
+                out::talk(&format!(
+                    "{}: {} points, {crs}",
+                    scan.pattern,
+                    short(facts.points as f64)
+                ));
+                facts.notes.iter().for_each(|note| out::talk(&format!("    {note}")));
+            }
+            Err(error) => out::talk(&format!("{}: left out: {error}", scan.pattern)),
+        }
+    }
+}
+
+fn text(args: &Args, scans: &[Scan]) -> Result<String> {
+    let folder = args.folder.canonicalize().unwrap_or_else(|_| args.folder.clone());
+    let own_name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
+    let name = args.name.clone().or(own_name).unwrap_or_else(|| "campaign".to_owned());
+    let quote = |text: &str| toml_edit::Value::from(text).to_string();
+    let list = |patterns: Vec<String>| {
+        let items: Vec<String> =
+            patterns.iter().map(|pattern| format!("    {},\n", quote(pattern))).collect();
+        format!("[\n{}]\n", items.concat())
+    };
+    let platform: Platform = serde_json::from_value(args.platform.as_str().into())?;
+    let platform = serde_json::to_value(platform)?;
+    let mut text = format!(
+        "name = {}\nplatform = {platform}\ninputs = {}",
+        quote(&name),
+        list(patterns(args, scans))
+    );
+    let bad: Vec<&Scan> = scans.iter().filter(|scan| scan.facts.is_err()).collect();
+    if !bad.is_empty() {
+        text.push_str("# Files that cannot be read:\n");
+        for scan in &bad {
+            let error = scan.facts.as_ref().err().map_or("", String::as_str);
+            text.push_str(&format!("#   {}: {}\n", scan.pattern, error.replace('\n', " ")));
+        }
+        text.push_str(&format!(
+            "exclude = {}",
+            list(bad.iter().map(|scan| escape(&scan.pattern)).collect())
+        ));
+    }
+    let known =
+        scans.iter().filter_map(|scan| scan.facts.as_ref().ok()).any(|facts| facts.crs.is_some());
+    if !known {
+        text.push_str("\n# The scans do not say their coordinate system. If you know it:\n# [crs]\n# epsg = 32610\n");
+    }
+    Ok(text)
+}
+
+/// One glob for each ending and depth that occurs, or the files by name when they lie elsewhere.
+fn patterns(args: &Args, scans: &[Scan]) -> Vec<String> {
+    let usable = scans.iter().filter(|scan| scan.facts.is_ok());
+    if !args.scans.is_empty() {
+        return usable.map(|scan| escape(&scan.pattern)).collect();
+    }
+    let glob = |scan: &Scan| {
+        let ending = scan.pattern.rsplit('.').next().unwrap_or("las").to_owned();
+        let depth = if scan.pattern.contains('/') { "**/*" } else { "*" };
+        format!("{depth}.{ending}")
+    };
+    let all: BTreeSet<String> = usable.map(glob).collect();
+    // `**/*.laz` also names the files of the folder itself.
+    let wider = |pattern: &String| all.contains(&format!("**/{pattern}"));
+    all.iter().filter(|pattern| !wider(pattern)).cloned().collect()
+}
+
+/// A path as a glob that names it alone.
+fn escape(path: &str) -> String {
+    glob::Pattern::escape(path)
+}
