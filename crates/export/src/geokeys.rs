@@ -18,6 +18,8 @@ mod key {
 
 /// The value that says "user-defined".
 const USER_DEFINED: u16 = 32767;
+/// EPSG code of the metre.
+const METRE: u16 = 9001;
 /// TIFF tag and LAS record of the ASCII parameters.
 const ASCII_PARAMS: u16 = 34737;
 
@@ -63,11 +65,14 @@ impl GeoKeys {
             }
             keys.number(key::LINEAR_UNITS, unit_code(crs.horizontal_m_per_unit));
         }
-        if purpose.elevation {
-            if let Some(vertical) = crs.vertical_epsg.and_then(|code| u16::try_from(code).ok()) {
-                keys.number(key::VERTICAL_CRS, vertical);
-            }
-            keys.number(key::VERTICAL_UNITS, unit_code(crs.vertical_m_per_unit));
+        let vertical = crs.vertical_epsg.and_then(|code| u16::try_from(code).ok());
+        let vertical_unit = unit_code(crs.vertical_m_per_unit);
+        if let (true, Some(vertical)) = (purpose.elevation, vertical) {
+            keys.number(key::VERTICAL_CRS, vertical);
+        }
+        // Metres need no saying: the key alone makes readers invent a vertical system.
+        if purpose.elevation && (vertical.is_some() || vertical_unit != METRE) {
+            keys.number(key::VERTICAL_UNITS, vertical_unit);
         }
         keys.finish()
     }

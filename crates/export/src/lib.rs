@@ -7,10 +7,11 @@
 //!
 //! * [`csv_table`] and [`table`]: `trees.csv` and its dictionary.
 //! * [`gpkg`] and [`layers`]: `trees.gpkg`.
-//! * [`geotiff`], [`vrt`], [`mosaic`], [`chm`]: rasters larger than memory.
+//! * [`geotiff`], [`vrt`], [`mosaic`], [`chm`], [`closing`]: rasters larger than memory.
 //! * [`las`]: point files with extra dimensions.
 
 pub mod chm;
+pub mod closing;
 pub mod crs;
 pub mod csv_table;
 pub mod error;
@@ -21,6 +22,7 @@ pub mod las;
 pub mod layers;
 pub mod mosaic;
 pub mod sorted_trees;
+pub mod stage;
 pub mod table;
 pub mod vrt;
 pub mod window;

@@ -1,5 +1,7 @@
 //! What is written as LAS or LAZ is what the `las` crate reads back.
 
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
 use las::Reader;
 use proptest::prelude::*;
 use std::path::Path;
@@ -23,7 +25,7 @@ fn cloud(seeds: &[(i32, i32, i32, u16)]) -> PointCloud {
             return_number: returns,
             number_of_returns: 7,
             classification: (seed % 32) as u8,
-            flags: (seed % 8) as u8 | (seed >> 3 & 3) as u8 * 16,
+            flags: (seed % 8) as u8 + (seed / 8 % 4) as u8 * 16,
             scan_angle_deg: f32::from((seed % 41) as u8) - 20.0,
             gps_time: f64::from(*seed) * 0.25,
             source_id: seed ^ 0x55,
@@ -39,6 +41,9 @@ fn cloud(seeds: &[(i32, i32, i32, u16)]) -> PointCloud {
     let height = seeds.iter().map(|s| f32::from(s.3) * 0.01).collect();
     cloud.extra.insert("treeID".into(), Column::F64(id));
     cloud.extra.insert("HeightAboveGround".into(), Column::F32(height));
+    let bytes = |f: &dyn Fn(u16) -> u8| Column::U8(seeds.iter().map(|s| f(s.3)).collect());
+    cloud.extra.insert("user_data".into(), bytes(&|seed| (seed % 251) as u8));
+    cloud.extra.insert("scanner_channel".into(), bytes(&|seed| (seed % 4) as u8));
     for (name, shift) in [("red", 0), ("green", 3), ("blue", 6), ("nir", 9)] {
         let values = seeds.iter().map(|s| s.3.rotate_left(shift)).collect();
         cloud.extra.insert(name.into(), Column::U16(values));
@@ -85,6 +90,12 @@ fn check(path: &Path, expected: &PointCloud, colour: Colour) {
         assert_eq!(found.gps_time, Some(wanted.gps_time));
         assert_eq!(found.point_source_id, wanted.source_id);
         let of = |name: &str| expected.extra[name].value(index) as u16;
+        assert_eq!(u16::from(found.user_data), of("user_data"));
+        let modern = reader.header().version().minor == 4;
+        assert_eq!(
+            u16::from(found.scanner_channel),
+            if modern { of("scanner_channel") } else { 0 }
+        );
         let rgb = las::Color::new(of("red"), of("green"), of("blue"));
         assert_eq!(found.color, (colour > Colour::None).then_some(rgb));
         assert_eq!(found.nir, (colour == Colour::RgbNir).then(|| of("nir")));

@@ -71,6 +71,14 @@ pub enum LasVersion {
     V1_4,
 }
 
+/// Whether an extra column has a place of its own in a record (colours, user data, scanner channel)
+/// and so must not be a [`Dimension`].
+#[must_use]
+pub fn is_standard_field(column: &str) -> bool {
+    record::COLOURS.contains(&column)
+        || [record::USER_DATA, record::SCANNER_CHANNEL].contains(&column)
+}
+
 /// Which colours a file has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Colour {

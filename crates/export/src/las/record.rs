@@ -7,7 +7,10 @@ use timberline_artefact::Crs;
 use timberline_pointcloud::{Column, PointCloud};
 
 /// Names of the extra columns that hold colours.
-const COLOURS: [&str; 4] = ["red", "green", "blue", "nir"];
+pub(super) const COLOURS: [&str; 4] = ["red", "green", "blue", "nir"];
+/// Names of the extra columns that have a place of their own in a record.
+pub(super) const USER_DATA: &str = "user_data";
+pub(super) const SCANNER_CHANNEL: &str = "scanner_channel";
 
 /// How the records of a file look.
 #[derive(Debug, Clone)]
@@ -19,8 +22,10 @@ pub(super) struct Layout {
     dimensions: Vec<Dimension>,
 }
 
-/// The extra columns of a cloud that a file takes: colours, then dimensions; missing ones `None`.
+/// The extra columns of a cloud that a file takes; missing ones `None`.
 pub(super) struct Columns<'a> {
+    user_data: Option<&'a Column>,
+    scanner_channel: Option<&'a Column>,
     colours: Vec<Option<&'a Column>>,
     dimensions: Vec<Option<&'a Column>>,
 }
@@ -74,6 +79,8 @@ impl Layout {
         let colours = COLOURS[..self.colours()].iter().map(|name| find(name, DimensionType::U16));
         let dimensions = self.dimensions.iter().map(|d| find(&d.name, d.kind));
         Ok(Columns {
+            user_data: find(USER_DATA, DimensionType::U8)?,
+            scanner_channel: find(SCANNER_CHANNEL, DimensionType::U8)?,
             colours: colours.collect::<Result<_, _>>()?,
             dimensions: dimensions.collect::<Result<_, _>>()?,
         })
@@ -95,8 +102,8 @@ impl Layout {
         }
         bytes.extend(cloud.intensity[index].to_le_bytes());
         match self.version {
-            LasVersion::V1_4 => push_modern(bytes, cloud, index, path)?,
-            LasVersion::V1_2 => push_legacy(bytes, cloud, index, path)?,
+            LasVersion::V1_4 => push_modern(bytes, cloud, index, columns, path)?,
+            LasVersion::V1_2 => push_legacy(bytes, cloud, index, columns, path)?,
         }
         let time = cloud.gps_time[index];
         bytes.extend(if time.is_nan() { 0.0 } else { time }.to_le_bytes());
@@ -141,6 +148,11 @@ fn push_value(bytes: &mut Vec<u8>, column: &Column, index: usize) {
     }
 }
 
+/// The value of a column of bytes; 0 without one.
+fn byte(column: Option<&Column>, index: usize) -> u8 {
+    if let Some(Column::U8(values)) = column { values[index] } else { 0 }
+}
+
 /// Refuses a value that its field has no room for.
 fn within(
     value: u8,
@@ -161,6 +173,7 @@ fn push_modern(
     bytes: &mut Vec<u8>,
     cloud: &PointCloud,
     index: usize,
+    columns: &Columns<'_>,
     path: &Path,
 ) -> Result<(), Error> {
     let returns = |value, field| within(value, 15, field, path, (4, 6));
@@ -169,10 +182,11 @@ fn push_modern(
     let flags = cloud.flags[index];
     let (edge, direction) = (flags >> 4 & 1, flags >> 5 & 1);
     bytes.push(number | count << 4);
+    let channel = byte(columns.scanner_channel, index) & 0x03;
     // Bits 0 to 3 are the same in the store; 4 and 5 are the scanner channel; 6 direction, 7 edge.
-    bytes.push(flags & 0x0F | direction << 6 | edge << 7);
+    bytes.push(flags & 0x0F | channel << 4 | direction << 6 | edge << 7);
     bytes.push(cloud.classification[index]);
-    bytes.push(0); // user data
+    bytes.push(byte(columns.user_data, index));
     let angle = (cloud.scan_angle_deg[index] / 0.006).round() as i16;
     bytes.extend(angle.to_le_bytes());
     bytes.extend(cloud.source_id[index].to_le_bytes());
@@ -184,6 +198,7 @@ fn push_legacy(
     bytes: &mut Vec<u8>,
     cloud: &PointCloud,
     index: usize,
+    columns: &Columns<'_>,
     path: &Path,
 ) -> Result<(), Error> {
     let small = |value, limit, field| within(value, limit, field, path, (2, 1));
@@ -196,7 +211,7 @@ fn push_legacy(
     bytes.push(number | count << 3 | direction << 6 | edge << 7);
     bytes.push(class | (flags & 0x07) << 5);
     bytes.push((cloud.scan_angle_deg[index].round() as i8).to_le_bytes()[0]);
-    bytes.push(0); // user data
+    bytes.push(byte(columns.user_data, index));
     bytes.extend(cloud.source_id[index].to_le_bytes());
     Ok(())
 }

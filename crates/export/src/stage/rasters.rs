@@ -1,0 +1,134 @@
+//! Terrain and canopy height models of every site.
+
+use super::Params;
+use super::survey::Survey;
+use crate::crs::unit_name;
+use crate::geotiff::{RasterSpec, Source, write_raster};
+use crate::{Error, Mosaic, Window, chm, closing, vrt};
+use std::fs::File;
+use std::io::BufWriter;
+use timberline_artefact::stage::{Context, StageError};
+use timberline_artefact::{Crs, OutputFolder};
+use timberline_pointcloud::sites::file_name;
+
+/// Writes both rasters.
+pub(super) fn write(
+    survey: &mut Survey,
+    params: &Params,
+    context: &Context<'_>,
+    folder: &mut OutputFolder,
+) -> Result<(), StageError> {
+    let crs = survey.crs.clone().unwrap_or_default();
+    let sites = survey.footprint.sites();
+    let windows = |cell_m| sites.iter().map(|site| Window::touching(site, cell_m)).collect();
+    let canopy = Product {
+        stem: "chm",
+        cell_m: params.chm_cell_m,
+        windows: windows(params.chm_cell_m),
+        description: "Highest point of the cell above ground",
+        unit: "metre",
+        elevation: false,
+    };
+    let terrain = Product {
+        stem: "dtm",
+        cell_m: survey.dtm_cell_m,
+        windows: windows(survey.dtm_cell_m),
+        description: "Terrain elevation at the centre of the cell",
+        unit: unit_name(crs.vertical_m_per_unit),
+        elevation: true,
+    };
+    let Survey { chm, dtm, .. } = survey;
+    let cancelled = || context.check_cancelled().map_err(StageError::from);
+    canopy.write(&crs, folder, &cancelled, &mut |window| canopy_values(chm, window, params))?;
+    let dtm_cell_m = terrain.cell_m;
+    let mut values = |window| terrain_values(dtm, chm, window, dtm_cell_m, params);
+    terrain.write(&crs, folder, &cancelled, &mut values)
+}
+
+/// One raster product of all sites.
+struct Product {
+    stem: &'static str,
+    cell_m: f64,
+    windows: Vec<Window>,
+    description: &'static str,
+    unit: &'static str,
+    elevation: bool,
+}
+
+impl Product {
+    fn write(
+        &self,
+        crs: &Crs,
+        folder: &mut OutputFolder,
+        cancelled: &dyn Fn() -> Result<(), StageError>,
+        source: &mut Source<'_>,
+    ) -> Result<(), StageError> {
+        let Self { stem, cell_m, windows, description, unit, elevation } = self;
+        let mut written = Vec::new();
+        for (site, window) in windows.iter().enumerate() {
+            cancelled()?;
+            let spec = RasterSpec {
+                cell_m: *cell_m,
+                window: *window,
+                crs,
+                description,
+                unit,
+                elevation: *elevation,
+            };
+            let name = file_name(stem, "tif", site, windows.len());
+            let path = folder.file(&name);
+            let out = BufWriter::new(File::create(&path).map_err(Error::io(&path, "create"))?);
+            write_raster(out, &path, &spec, source)?;
+            written.push((name, spec));
+        }
+        if written.len() > 1
+            && let Some(xml) = vrt::mosaic_xml(&written)
+        {
+            let path = folder.file(&format!("{stem}.vrt"));
+            std::fs::write(&path, xml).map_err(Error::io(&path, "write"))?;
+        }
+        Ok(())
+    }
+}
+
+fn canopy_values(canopy: &mut Mosaic, window: Window, params: &Params) -> Result<Vec<f32>, Error> {
+    let reach = (params.chm_fill_m / params.chm_cell_m).round() as u32;
+    let values = canopy.read(window.grown(reach))?;
+    Ok(chm::fill_gaps(&values, window, reach))
+}
+
+/// The terrain where there are points, and across gaps between them.
+fn terrain_values(
+    terrain: &mut Mosaic,
+    canopy: &mut Mosaic,
+    window: Window,
+    cell_m: f64,
+    params: &Params,
+) -> Result<Vec<f32>, Error> {
+    let mut values = terrain.read(window)?;
+    if values.iter().all(|value| value.is_nan()) {
+        return Ok(values);
+    }
+    let canopy_cell = params.chm_cell_m;
+    let centre = |index: i64| (index as f64 + 0.5) * cell_m;
+    let cell_at = |index: i64| (centre(index) / canopy_cell).floor() as i64;
+    let (column0, row0) = (cell_at(window.column0), cell_at(window.row0));
+    let mask_window = Window {
+        column0,
+        row0,
+        columns: (cell_at(window.end_column() - 1) - column0 + 1) as u32,
+        rows: (cell_at(window.end_row() - 1) - row0 + 1) as u32,
+    };
+    let reach = (params.dtm_gap_m / 2.0 / canopy_cell).ceil() as u32;
+    let around = canopy.read(mask_window.grown(2 * reach))?;
+    let occupied: Vec<bool> = around.iter().map(|value| !value.is_nan()).collect();
+    let mask = closing::closed(&occupied, mask_window, reach);
+    for row in window.row0..window.end_row() {
+        for column in window.column0..window.end_column() {
+            if !mask[mask_window.index(cell_at(column), cell_at(row))] {
+                values[window.index(column, row)] = f32::NAN;
+            }
+        }
+    }
+    Ok(values)
+}

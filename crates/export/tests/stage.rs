@@ -1,0 +1,81 @@
+//! The stage `export` over a small campaign.
+
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod scene;
+
+use std::collections::BTreeMap;
+use std::path::Path;
+use timberline_artefact::kinds::Outputs;
+use timberline_artefact::{Kind, UnitId};
+use timberline_export::stage::{ExportStage, Params};
+
+/// Runs the stage; returns the manifest and the contents of all files in the outputs folder.
+fn export(
+    folder: &Path,
+    edge_m: u32,
+    origin_m: [i64; 2],
+    plots: usize,
+) -> (Outputs, BTreeMap<String, Vec<u8>>) {
+    let mut alone = scene::campaign(folder, edge_m, origin_m, plots);
+    let manifest = alone.run::<ExportStage>(UnitId::Campaign, None, &Params::default()).unwrap();
+    let (header, outputs) = timberline_artefact::read::<Outputs>(&manifest).unwrap();
+    assert_eq!(header.kind, Outputs::NAME);
+    let entries = std::fs::read_dir(alone.outputs()).unwrap().map(Result::unwrap);
+    let files = entries
+        .map(|e| (e.file_name().into_string().unwrap(), std::fs::read(e.path()).unwrap()))
+        .collect();
+    (outputs, files)
+}
+
+#[test]
+fn one_plot() {
+    let folder = tempfile::tempdir().unwrap();
+    let (outputs, files) = export(folder.path(), 64, [0, 0], 1);
+    let expected =
+        ["chm.tif", "dtm.tif", "points.laz", "trees.csv", "trees.dictionary.csv", "trees.gpkg"];
+    assert_eq!(files.keys().collect::<Vec<_>>(), expected);
+    let listed: Vec<_> = outputs.files.iter().map(|file| (&file.name, file.bytes)).collect();
+    let found: Vec<_> = files.iter().map(|(name, bytes)| (name, bytes.len() as u64)).collect();
+    assert_eq!(listed, found);
+    assert_eq!((outputs.totals["trees"], outputs.totals["points"]), (49, 30_000));
+    let rows = String::from_utf8(files["trees.csv"].clone()).unwrap();
+    assert_eq!(rows.lines().count(), 50);
+    if let Ok(keep) = std::env::var("TIMBERLINE_KEEP_OUTPUTS") {
+        std::fs::create_dir_all(&keep).unwrap();
+        files
+            .iter()
+            .for_each(|(name, bytes)| std::fs::write(Path::new(&keep).join(name), bytes).unwrap());
+    }
+}
+
+#[test]
+fn two_plots_far_apart_get_a_raster_each() {
+    let folder = tempfile::tempdir().unwrap();
+    let (outputs, files) = export(folder.path(), 64, [0, 0], 2);
+    for name in ["dtm-1.tif", "dtm-2.tif", "dtm.vrt", "chm-1.tif", "chm-2.tif", "chm.vrt"] {
+        assert!(files.contains_key(name), "{name}");
+    }
+    assert!(!files.contains_key("dtm.tif"));
+    assert_eq!(outputs.totals["sites"], 2);
+    if let Ok(keep) = std::env::var("TIMBERLINE_KEEP_OUTPUTS") {
+        let keep = Path::new(&keep).join("two");
+        std::fs::create_dir_all(&keep).unwrap();
+        files.iter().for_each(|(name, bytes)| std::fs::write(keep.join(name), bytes).unwrap());
+    }
+}
+
+#[test]
+fn how_the_campaign_is_cut_does_not_matter() {
+    let (a, b) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    let (_, reference) = export(a.path(), 32, [0, 0], 1);
+    let (_, larger) = export(b.path(), 128, [0, 0], 1);
+    for (name, bytes) in &reference {
+        assert!(larger[name] == *bytes, "{name} differs");
+    }
+    let c = tempfile::tempdir().unwrap();
+    let (_, shifted) = export(c.path(), 50, [7, -13], 1);
+    for name in ["chm.tif", "dtm.tif", "trees.csv", "trees.gpkg"] {
+        assert!(shifted[name] == reference[name], "{name} differs");
+    }
+}
