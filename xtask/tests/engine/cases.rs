@@ -1,0 +1,295 @@
+//! The engine over a tiny chain: what runs, what does not, and what it says about it.
+
+use crate::support::{PIPELINE, Stand, row_text, tile};
+use std::collections::BTreeMap;
+
+fn counts(pairs: &[(&str, u64)]) -> BTreeMap<String, u64> {
+    pairs.iter().map(|(stage, count)| ((*stage).to_owned(), *count)).collect()
+}
+
+fn ran_once() -> Stand {
+    let stand = Stand::new();
+    let ran = stand.run(&[]);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    assert_eq!(Stand::done(&ran), counts(&[("scan", 4), ("sum", 16), ("blur", 16), ("finish", 1)]));
+    stand
+}
+
+/// The plan's line of a stage: units to run, and why.
+fn plan(stand: &Stand, stage: &str, env: &[(&str, &str)]) -> (u64, String) {
+    let pipeline = stand.path("pipeline.toml");
+    let ran = stand.xtask(&["plan", pipeline.to_str().unwrap(), "--json"], env);
+    assert_eq!(ran.code, 0, "{}", ran.stderr);
+    let lines: serde_json::Value = serde_json::from_str(&ran.stdout).unwrap();
+    let line = lines.as_array().unwrap().iter().find(|line| line["stage"] == stage).unwrap();
+    (line["to_run"].as_u64().unwrap(), line["why"].to_string().replace("\\\"", "\""))
+}
+
+#[test]
+fn a_second_run_does_nothing() {
+    let stand = ran_once();
+    let before = stand.products();
+    let again = stand.run(&[]);
+    assert_eq!((again.code, Stand::done(&again)), (0, BTreeMap::new()));
+    assert_eq!(stand.products(), before);
+}
+
+#[test]
+fn touching_a_file_without_changing_it_does_nothing() {
+    let stand = ran_once();
+    stand.write("row1.txt", &row_text(1));
+    assert_eq!(Stand::done(&stand.run(&[])), BTreeMap::new());
+}
+
+#[test]
+fn a_changed_parameter_is_named_with_its_line() {
+    let stand = ran_once();
+    stand.write("pipeline.toml", &PIPELINE.replace("factor = 2.0", "factor = 3.0"));
+    let (to_run, why) = plan(&stand, "sum", &[]);
+    assert_eq!(to_run, 16);
+    assert!(
+        why.contains("parameter `factor` 2.0 -> 3.0") && why.contains("pipeline.toml:5:1"),
+        "{why}"
+    );
+    let (to_run, why) = plan(&stand, "blur", &[]);
+    assert!(to_run == 16 && why.contains("follows `sum`: parameter `factor`"), "{why}");
+    assert_eq!(plan(&stand, "scan", &[]).0, 0);
+    let explained = stand.xtask(&["explain", "blur/tile:1_1"], &[]);
+    for part in [
+        "blur: 1 of 16 would run",
+        "because sum/tile:0_0: parameter `factor` 2.0 -> 3.0",
+        "downstream: finish",
+    ] {
+        assert!(explained.stdout.contains(part), "{part} in\n{}", explained.stdout);
+    }
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("sum", 16), ("blur", 16), ("finish", 1)]));
+}
+
+#[test]
+fn a_removed_parameter_is_named() {
+    let stand = ran_once();
+    stand.write("pipeline.toml", &PIPELINE.replace("offset_m = 0.5\n", ""));
+    let (to_run, why) = plan(&stand, "sum", &[]);
+    assert_eq!(to_run, 16);
+    for part in ["parameter `offset_m` 0.5 -> 0.0", "default, not set in [sum]", "pipeline.toml:4"]
+    {
+        assert!(why.contains(part), "{part} in {why}");
+    }
+}
+
+#[test]
+fn an_added_file_runs_its_own_tiles_and_their_neighbours() {
+    let stand = ran_once();
+    stand.write("extra.txt", "35.5 35.5 100\n");
+    assert_eq!(plan(&stand, "scan", &[]), (1, "[[1,\"not made before\"]]".to_owned()));
+    let (to_run, why) = plan(&stand, "sum", &[]);
+    assert!(to_run == 1 && why.contains("follows `scan`: not made before"), "{why}");
+    let explained = stand.xtask(&["explain", "sum/tile:3_3"], &[]).stdout;
+    assert!(explained.contains("input added: shards of file:extra.txt"), "{explained}");
+    let ran = stand.run(&[]);
+    assert_eq!(Stand::done(&ran), counts(&[("scan", 1), ("sum", 1), ("blur", 4), ("finish", 1)]));
+}
+
+#[test]
+fn a_removed_file_is_noticed() {
+    let stand = ran_once();
+    std::fs::remove_file(stand.path("row3.txt")).unwrap();
+    // Tiles of row 3 are gone; those of row 2 lose neighbours.
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("blur", 4), ("finish", 1)]));
+}
+
+#[test]
+fn a_corrupt_artefact_is_rebuilt_alone() {
+    let stand = ran_once();
+    let before = stand.products();
+    let path = stand.artefact("sum", &format!("{}-", tile(2, 1)));
+    let mut bytes = std::fs::read(&path).unwrap();
+    bytes[20] ^= 1;
+    std::fs::write(&path, &bytes).unwrap();
+    let (to_run, why) = plan(&stand, "sum", &[]);
+    assert!(to_run == 1 && why.contains("corrupt at payload"), "{why}");
+    assert_eq!(plan(&stand, "blur", &[]).0, 0);
+    let checked = stand.xtask(&["doctor"], &[]);
+    assert!(checked.code == 3 && checked.stdout.contains("1 corrupt"), "{}", checked.stdout);
+    let ran = stand.run(&[]);
+    assert_eq!(Stand::done(&ran), counts(&[("sum", 1)]));
+    assert!(ran.stderr.contains("rebuilding sum/tile:2_1"), "{}", ran.stderr);
+    assert_eq!(stand.products(), before);
+}
+
+#[test]
+fn a_changed_output_is_written_again() {
+    let stand = ran_once();
+    let before = stand.products();
+    stand.write(".timberline/outputs/total.txt", "0\n");
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("finish", 1)]));
+    assert_eq!(stand.products(), before);
+}
+
+#[test]
+fn a_raised_stage_version_is_named() {
+    let stand = ran_once();
+    let raised = [("XTASK_TEST_VERSION", "2")];
+    let (to_run, why) = plan(&stand, "sum", &raised);
+    assert!(to_run == 16 && why.contains("stage `sum` is now version 2, was 1"), "{why}");
+    assert_eq!(
+        Stand::done(&stand.run(&raised)),
+        counts(&[("sum", 16), ("blur", 16), ("finish", 1)])
+    );
+    // The artefacts of version 1 are still there.
+    assert_eq!(Stand::done(&stand.run(&[])), BTreeMap::new());
+}
+
+#[test]
+fn a_failed_unit_stops_only_what_needs_it() {
+    for fail in ["tile:0_0", "panic tile:0_0"] {
+        let stand = Stand::new();
+        let ran = stand.run(&[("XTASK_TEST_FAIL", fail)]);
+        assert_eq!(ran.code, 3, "{}", ran.stderr);
+        assert_eq!(
+            Stand::done(&ran),
+            counts(&[("scan", 4), ("sum", 15), ("blur", 12), ("finish", 1)])
+        );
+        assert!(ran.stderr.contains("on purpose"), "{}", ran.stderr);
+        assert!(ran.stderr.contains("--only sum/tile:0_0"), "{}", ran.stderr);
+        let pipeline = stand.path("pipeline.toml");
+        let only = ["run", pipeline.to_str().unwrap(), "--json", "--only", "sum/tile:0_0"];
+        assert_eq!(Stand::done(&stand.xtask(&only, &[])), counts(&[("sum", 1)]));
+        assert_eq!(Stand::done(&stand.run(&[])), counts(&[("blur", 4), ("finish", 1)]));
+    }
+}
+
+#[test]
+fn fail_fast_stops_and_says_so() {
+    let stand = Stand::new();
+    let pipeline = stand.path("pipeline.toml");
+    let args = ["run", pipeline.to_str().unwrap(), "--fail-fast", "--jobs", "1"];
+    let ran = stand.xtask(&args, &[("XTASK_TEST_FAIL", "tile:0_1")]);
+    assert_eq!(ran.code, 1, "{}", ran.stderr);
+}
+
+#[test]
+fn a_bad_file_is_a_loss_and_the_rest_goes_on() {
+    let stand = Stand::new();
+    stand.write("bad.txt", "no points\n");
+    stand.write("twin.txt", &row_text(2));
+    let ran = stand.run(&[]);
+    assert_eq!(ran.code, 3);
+    assert!(ran.stderr.contains("left out: bad.txt: invalid float"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("left out: twin.txt: has the same contents as row2.txt"),
+        "{}",
+        ran.stderr
+    );
+    assert_eq!(Stand::done(&ran), counts(&[("scan", 4), ("sum", 16), ("blur", 16), ("finish", 1)]));
+}
+
+#[test]
+fn from_until_and_unknown_names() {
+    let stand = Stand::new();
+    let pipeline = stand.path("pipeline.toml");
+    let run = |more: &[&str]| {
+        let mut args = vec!["run", pipeline.to_str().unwrap(), "--json"];
+        args.extend(more);
+        stand.xtask(&args, &[])
+    };
+    assert_eq!(Stand::done(&run(&["--until", "sum"])), counts(&[("scan", 4), ("sum", 16)]));
+    assert_eq!(Stand::done(&run(&["--from", "blur"])), counts(&[("blur", 16), ("finish", 1)]));
+    let unknown = run(&["--until", "blurr"]);
+    assert!(
+        unknown.code == 2 && unknown.stderr.contains("did you mean `blur`?"),
+        "{}",
+        unknown.stderr
+    );
+}
+
+#[test]
+fn all_configuration_errors_at_once() {
+    let stand = Stand::new();
+    let text = "nam = \"x\"\nstages = [\"scan\", \"sum\", \"blurr\"]\n[sum]\nfactor = 10\noffset = 1\n[blur]\n[finish]\nx = 1\n";
+    stand.write("pipeline.toml", text);
+    stand.write(
+        "campaign.toml",
+        "name = \"x\"\nplatform = \"als\"\ninputs = [\"*.txt\"]\nplot = 1\n",
+    );
+    let ran = stand.run(&[]);
+    assert_eq!(ran.code, 2);
+    for part in [
+        "pipeline.toml:1:1: unknown key `nam`\n    did you mean `name`?",
+        "pipeline.toml:2:26: there is no stage `blurr`\n    did you mean `blur`?",
+        "pipeline.toml:4:10: `factor` is 10; it must be a number from 0.5 to 9.0 m (stage sum)",
+        "pipeline.toml:5:1: unknown key `offset` (stage sum)\n    did you mean `offset_m`?",
+        "stage `finish` has parameters but is not in `stages`",
+        "campaign.toml:4:1: unknown key `plot`",
+    ] {
+        assert!(ran.stderr.contains(part), "{part}\nin\n{}", ran.stderr);
+    }
+}
+
+#[test]
+fn parameters_that_do_not_go_together() {
+    let stand = Stand::new();
+    stand.write("pipeline.toml", &PIPELINE.replace("2.0", "7").replace("0.5", "1"));
+    let ran = stand.run(&[]);
+    assert!(ran.code == 2 && ran.stderr.contains("pipeline.toml:4:"), "{}", ran.stderr);
+    assert!(
+        ran.stderr.contains("[sum] `factor` 7 does not go with `offset_m` 1"),
+        "{}",
+        ran.stderr
+    );
+}
+
+#[test]
+fn stages_out_of_order() {
+    let stand = Stand::new();
+    stand.write("pipeline.toml", "name = \"x\"\nstages = [\"scan\", \"blur\", \"sum\"]\n");
+    let ran = stand.run(&[]);
+    let expected =
+        "stage `blur` reads `heights`, which no stage before it writes\n    stage `sum` writes it";
+    assert!(ran.code == 2 && ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn gc_keeps_what_is_used_and_what_is_pinned() {
+    let stand = ran_once();
+    let before = stand.products();
+    assert!(stand.xtask(&["cache", "pin"], &[]).stdout.contains("pinned"));
+    stand.write("pipeline.toml", &PIPELINE.replace("factor = 2.0", "factor = 3.0"));
+    assert_eq!(stand.run(&[]).code, 0);
+    assert!(stand.xtask(&["cache", "gc"], &[]).stdout.starts_with("0 artefacts"));
+    let compared = stand.xtask(&["diff"], &[]).stdout;
+    assert!(compared.contains("sum.factor: 2.0 -> 3.0"), "{compared}");
+    stand.xtask(&["cache", "pin", "--remove"], &[]);
+    let run: Vec<String> = xtask::engine::runlog::list(&stand.path(".timberline/runs"));
+    stand.xtask(&["cache", "pin", &run[0], "--remove"], &[]);
+    assert!(stand.xtask(&["cache", "gc"], &[]).stdout.starts_with("33 artefacts"));
+    stand.write("pipeline.toml", PIPELINE);
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("sum", 16), ("blur", 16), ("finish", 1)]));
+    let stale: Vec<_> =
+        before.keys().filter(|path| !stand.products().contains_key(*path)).collect();
+    assert!(stale.is_empty());
+}
+
+#[test]
+fn inspect_shows_what_is_inside() {
+    let stand = ran_once();
+    let path = stand.artefact("sum", &format!("{}-", tile(2, 1)));
+    let shown = stand.xtask(&["status"], &[]).stdout;
+    assert!(shown.contains("sum") && shown.contains("ended with exit code 0"), "{shown}");
+    let mut command = stand.command(&["inspect", path.to_str().unwrap()], &[]);
+    // `inspect` takes no campaign.
+    let args = serde_json::to_string(&["inspect", path.to_str().unwrap()]).unwrap();
+    command.env("XTASK_TEST_ARGS", args);
+    let shown = crate::support::ended(command.spawn().unwrap()).stdout;
+    for part in [
+        "kind           heights",
+        "tile:2_1",
+        "points = 10",
+        "factor = 2.0",
+        "by scan",
+        "height_m",
+        "12.5000",
+    ] {
+        assert!(shown.contains(part), "{part} in\n{shown}");
+    }
+}
