@@ -56,7 +56,7 @@ pub fn crs_of(
         None => None,
     };
     let keys = GeoKeys::parse(records, notes);
-    let by_keys = keys.map(|keys| keys.said(units)).transpose()?.flatten();
+    let by_keys = keys.map(|keys| keys.said(units, notes)).transpose()?.flatten();
     let wkt_first = header.says_wkt() || by_keys.is_none();
     compare(by_wkt.as_ref(), by_keys.as_ref(), wkt_first, notes);
     let (first, second) = if wkt_first { (by_wkt, by_keys) } else { (by_keys, by_wkt) };

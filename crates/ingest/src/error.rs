@@ -74,6 +74,19 @@ pub enum Error {
         /// Number of points the header promises.
         expected: u64,
     },
+    /// All points lie where no point can be.
+    #[error(
+        "all {points} points lie beyond what coordinates can be (the header's bounds begin at \
+         {:.0}, {:.0}, {:.0}; the limit is 67,108 km, in elevation 200 km); the scale or the offset \
+         in the header (bytes 131 to 178) is wrong: repair it or get the file again",
+        bounds[0], bounds[1], bounds[2]
+    )]
+    Nowhere {
+        /// Number of points.
+        points: u64,
+        /// Smallest coordinates stated, in the units of the file.
+        bounds: [f64; 3],
+    },
     /// Longitude and latitude.
     #[error(
         "the coordinate reference system `{name}` is {what}; reproject the file to a projected \

@@ -85,8 +85,8 @@ pub fn fields(
     to: usize,
     notes: &mut Notes,
 ) -> Vec<ExtraField> {
-    let mut layout = Fields { at: from, to, fields: Vec::new(), names: BTreeSet::new() };
-    TAKEN.iter().for_each(|name| drop(layout.names.insert((*name).to_owned())));
+    let names: BTreeSet<String> = TAKEN.iter().map(|name| (*name).to_owned()).collect();
+    let mut layout = Fields { at: from, to, fields: Vec::new(), names };
     'records: for record in records {
         if !record.bytes.len().is_multiple_of(DESCRIPTION_LEN) {
             notes.say(format!(

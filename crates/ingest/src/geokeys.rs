@@ -26,6 +26,8 @@ const MODEL_GEOCENTRIC: u16 = 3;
 const USER_DEFINED: u16 = 32767;
 const DOUBLES: u16 = 34736;
 const ASCII: u16 = 34737;
+/// EPSG codes of units of length lie in this range.
+const EPSG_UNITS: std::ops::RangeInclusive<u16> = 9001..=9099;
 
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Entry {
@@ -99,7 +101,7 @@ impl GeoKeys {
     ///
     /// # Errors
     /// [`Error::Unit`] for units other than metres and feet.
-    pub(crate) fn said(&self, units: UnitChoice) -> Result<Option<Said>, Error> {
+    pub(crate) fn said(&self, units: UnitChoice, notes: &mut Notes) -> Result<Option<Said>, Error> {
         let (projected, geographic) = (self.code(PROJECTED), self.code(GEOGRAPHIC));
         let known = projected.or(geographic).is_some()
             || self.entries.contains_key(&LINEAR_UNITS)
@@ -117,9 +119,9 @@ impl GeoKeys {
         let code = if not_projected.is_some() { geographic } else { projected };
         let mut said = Said { name: self.name(code), epsg: code, not_projected, ..Said::default() };
         if not_projected.is_none() {
-            said.horizontal = self.horizontal(projected, units.horizontal)?;
+            said.horizontal = self.horizontal(projected, units.horizontal, notes)?;
             said.vertical_epsg = self.code(VERTICAL);
-            said.vertical = self.vertical(units.vertical)?;
+            said.vertical = self.vertical(units.vertical, notes)?;
         }
         Ok(Some(said))
     }
@@ -137,50 +139,80 @@ impl GeoKeys {
         }
     }
 
-    fn horizontal(&self, code: Option<u32>, choice: LengthUnit) -> Result<Option<f64>, Error> {
+    fn horizontal(
+        &self,
+        code: Option<u32>,
+        choice: LengthUnit,
+        notes: &mut Notes,
+    ) -> Result<Option<f64>, Error> {
         if let Some(metres) = choice.metres() {
             return Ok(Some(metres));
         }
-        if let Some(unit) = self.short(LINEAR_UNITS).filter(|unit| !matches!(unit, 0 | 32767)) {
-            return unit_of_code(unit, "ProjLinearUnitsGeoKey (3076)", "horizontal_unit").map(Some);
+        let by_code = code.map(epsg::unit_of);
+        let stated = match self.unit(LINEAR_UNITS, "horizontal_unit", notes)? {
+            Some(metres) => Some(metres),
+            None => self.unit_size()?,
+        };
+        if let Some(metres) = stated {
+            if by_code.is_some_and(|by_code| by_code != Some(metres)) {
+                notes.say(format!(
+                    "the keys give EPSG:{} and a unit of x and y that is not that system's \
+                     ({metres} m); the unit is taken, the code may be wrong",
+                    code.unwrap_or_default()
+                ));
+            }
+            return Ok(Some(metres));
         }
-        if let Some(size) = self.double(LINEAR_UNIT_SIZE) {
-            let place = "ProjLinearUnitSizeGeoKey (3077)".to_owned();
-            let unit =
-                || Error::Unit { place, unit: format!("{size} m"), param: "horizontal_unit" };
-            return exact_unit(size).ok_or_else(unit).map(Some);
-        }
-        let Some(code) = code else { return Ok(None) };
         let unknown = || Error::Unit {
             place: "ProjectedCSTypeGeoKey (3072)".to_owned(),
-            unit: format!("that of EPSG:{code}"),
+            unit: format!("that of EPSG:{}", code.unwrap_or_default()),
             param: "horizontal_unit",
         };
-        epsg::unit_of(code).ok_or_else(unknown).map(Some)
+        by_code.map(|by_code| by_code.ok_or_else(unknown)).transpose()
     }
 
-    fn vertical(&self, choice: LengthUnit) -> Result<Option<f64>, Error> {
+    /// A unit given by its size instead of a code.
+    fn unit_size(&self) -> Result<Option<f64>, Error> {
+        let Some(size) = self.double(LINEAR_UNIT_SIZE) else { return Ok(None) };
+        let unknown = || Error::Unit {
+            place: "ProjLinearUnitSizeGeoKey (3077)".to_owned(),
+            unit: format!("{size} m"),
+            param: "horizontal_unit",
+        };
+        exact_unit(size).ok_or_else(unknown).map(Some)
+    }
+
+    /// A unit given by its EPSG code. Numbers that are no code of a unit are passed over: some
+    /// writers put the code of the system there, or all bits set.
+    fn unit(&self, key: u16, param: &'static str, notes: &mut Notes) -> Result<Option<f64>, Error> {
+        match self.short(key) {
+            None | Some(0 | USER_DEFINED) => Ok(None),
+            Some(9001) => Ok(Some(1.0)),
+            Some(9002) => Ok(Some(INTERNATIONAL_FOOT_M)),
+            Some(9003) => Ok(Some(US_SURVEY_FOOT_M)),
+            Some(code) if EPSG_UNITS.contains(&code) => {
+                let (place, unit) = (format!("GeoTIFF key {key}"), format!("EPSG unit {code}"));
+                Err(Error::Unit { place, unit, param })
+            }
+            Some(code) => {
+                notes.say(format!("GeoTIFF key {key} gives the unit {code}, which is no unit"));
+                Ok(None)
+            }
+        }
+    }
+
+    fn vertical(&self, choice: LengthUnit, notes: &mut Notes) -> Result<Option<f64>, Error> {
         if let Some(metres) = choice.metres() {
             return Ok(Some(metres));
         }
-        if let Some(unit) = self.short(VERTICAL_UNITS).filter(|unit| !matches!(unit, 0 | 32767)) {
-            return unit_of_code(unit, "VerticalUnitsGeoKey (4099)", "vertical_unit").map(Some);
+        if let Some(metres) = self.unit(VERTICAL_UNITS, "vertical_unit", notes)? {
+            return Ok(Some(metres));
         }
         Ok(self.code(VERTICAL).and_then(|code| match code {
             // GeoTIFF 1.0's own vertical codes say nothing about the unit.
             ..=5199 => None,
             code => Some(epsg::vertical_foot(code).unwrap_or(1.0)),
         }))
-    }
-}
-
-/// Metres in an EPSG unit code: metre, international foot, US survey foot.
-fn unit_of_code(code: u16, place: &str, param: &'static str) -> Result<f64, Error> {
-    match code {
-        9001 => Ok(1.0),
-        9002 => Ok(INTERNATIONAL_FOOT_M),
-        9003 => Ok(US_SURVEY_FOOT_M),
-        _ => Err(Error::Unit { place: place.to_owned(), unit: format!("EPSG unit {code}"), param }),
     }
 }
 
@@ -206,7 +238,7 @@ mod tests {
             ..Records::default()
         };
         let keys = GeoKeys::parse(&records, &mut Notes::default()).unwrap();
-        let said = keys.said(UnitChoice::default()).unwrap().unwrap();
+        let said = keys.said(UnitChoice::default(), &mut Notes::default()).unwrap().unwrap();
         assert_eq!((said.name.as_str(), said.horizontal), ("Zone 5", Some(0.3048)));
     }
 
@@ -226,6 +258,23 @@ mod tests {
             let records = Records { geo_keys: directory(values), ..Records::default() };
             assert_eq!(GeoKeys::parse(&records, &mut Notes::default()), None);
         }
+    }
+
+    #[test]
+    fn a_unit_that_is_none_is_passed_over_and_one_that_contradicts_is_said() {
+        let said = |values: &[u16]| {
+            let records = Records { geo_keys: directory(values), ..Records::default() };
+            let mut notes = Notes::default();
+            let keys = GeoKeys::parse(&records, &mut notes).unwrap();
+            let said = keys.said(UnitChoice::default(), &mut notes).unwrap().unwrap();
+            (said.horizontal, notes.into_messages())
+        };
+        let (unit, notes) = said(&[1, 1, 0, 2, 1024, 0, 1, 1, 3076, 0, 1, 32632]);
+        assert_eq!(unit, None);
+        assert!(notes[0].contains("unit 32632, which is no unit"), "{notes:?}");
+        let (unit, notes) = said(&[1, 1, 0, 2, 3072, 0, 1, 26995, 3076, 0, 1, 9003]);
+        assert_eq!(unit, Some(US_SURVEY_FOOT_M));
+        assert!(notes[0].contains("EPSG:26995"), "{notes:?}");
     }
 
     #[test]

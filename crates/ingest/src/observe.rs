@@ -9,7 +9,7 @@ const CELL_M: f64 = 20.0;
 /// More cells than this are merged four to one: memory does not grow with the area.
 const MAX_CELLS: usize = 1 << 15;
 /// Cells with fewer points may have no ground return.
-const MIN_POINTS: u32 = 8;
+const MIN_POINTS: u32 = 20;
 /// A cell whose lowest point is nearer to 0 than this has its ground at 0.
 const NEAR_ZERO_M: f64 = 0.5;
 /// The share of cells with ground at 0 from which a file counts as normalised.

@@ -322,3 +322,6 @@ fn describe(error: &std::io::Error) -> String {
         format!("the compressed data are damaged ({error})")
     }
 }
+
+#[cfg(test)]
+mod tests;

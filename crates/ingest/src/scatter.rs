@@ -69,6 +69,9 @@ pub fn scatter<W: Write>(
     let mut notes = file.notes().clone();
     check_damage(&file, params.damaged, &mut notes)?;
     outside += file.outside();
+    if outside > 0 && observed.points == 0 {
+        return Err(Error::Nowhere { points: outside, bounds: file.header().bounds[0] });
+    }
     if outside > 0 {
         notes.say(format!(
             "{outside} points lie outside of what coordinates can be and are left out"

@@ -1,9 +1,10 @@
 //! Tells other kinds of files by their first bytes, so that a refusal says what was given.
 
 /// First bytes and what they mean.
-const KNOWN: [(&[u8], &str); 14] = [
+const KNOWN: [(&[u8], &str); 15] = [
     (b"ASTM-E57", "an E57 file"),
     (b"# .PCD", "a PCD file"),
+    (b"VERSION ", "a PCD file"),
     (b"ply\n", "a PLY file"),
     (b"ply\r\n", "a PLY file"),
     (b"\x89PNG", "a PNG image"),

@@ -1,6 +1,8 @@
 //! Small LAS files made byte by byte, for tests of what no writer would write.
 
 use crate::format::Layout;
+use laz::record::{RecordCompressor, SequentialPointRecordCompressor};
+use std::io::{Cursor, Seek, SeekFrom};
 
 /// Builds the bytes of an uncompressed LAS file.
 #[derive(Debug, Clone)]
@@ -96,6 +98,49 @@ impl LasBytes {
         self
     }
 
+    /// The same points compressed, with a chunk table, in chunks of the given number of points.
+    pub(crate) fn build_laz(self, chunk_size: u32) -> Vec<u8> {
+        let builder = laz::LazVlrBuilder::default()
+            .with_point_format(self.format, self.extra_len)
+            .unwrap()
+            .with_fixed_chunk_size(chunk_size);
+        let vlr = builder.build();
+        let mut data = Vec::new();
+        vlr.write_to(&mut data).unwrap();
+        let (count, records) = (self.records.len(), self.records.concat());
+        let mut empty = self.vlr("laszip encoded", 22204, &data);
+        empty.records.clear();
+        let mut bytes = empty.build();
+        bytes[104] |= 0x80;
+        bytes[107..111].copy_from_slice(&(count as u32).to_le_bytes());
+        if bytes[25] >= 4 {
+            bytes[247..255].copy_from_slice(&(count as u64).to_le_bytes());
+        }
+        let mut out = Cursor::new(bytes);
+        out.seek(SeekFrom::End(0)).unwrap();
+        let mut compressor = laz::LasZipCompressor::new(out, vlr).unwrap();
+        compressor.compress_many(&records).unwrap();
+        compressor.done().unwrap();
+        compressor.into_inner().into_inner()
+    }
+
+    /// The same points (formats 0 to 5) as one stream without a chunk table, as LASzip 1 wrote them.
+    pub(crate) fn build_laz_stream(self) -> Vec<u8> {
+        let records = self.records.clone();
+        let mut bytes = self.build_laz(50_000);
+        let points_at = u32::from_le_bytes(bytes[96..100].try_into().unwrap()) as usize;
+        let vlr_at = points_at - 34 - 6 * usize::from(bytes[points_at_items(&bytes)]);
+        bytes.truncate(points_at);
+        let vlr = laz::LazVlr::from_buffer(&bytes[vlr_at..]).unwrap();
+        bytes[vlr_at..vlr_at + 2].copy_from_slice(&1u16.to_le_bytes());
+        bytes[vlr_at + 12..vlr_at + 16].copy_from_slice(&0u32.to_le_bytes());
+        let mut out = SequentialPointRecordCompressor::new(bytes);
+        out.set_fields_from(vlr.items()).unwrap();
+        records.iter().for_each(|record| out.compress_next(record).unwrap());
+        out.done().unwrap();
+        RecordCompressor::into_inner(out)
+    }
+
     pub(crate) fn build(self) -> Vec<u8> {
         let header_len: usize = match self.version.1 {
             0..=2 => 227,
@@ -125,4 +170,12 @@ impl LasBytes {
         put(247, &(self.records.len() as u64).to_le_bytes());
         [out, self.vlrs, points, self.evlrs].concat()
     }
+}
+
+/// Where the number of items stands in the record of LASzip, the last before the points.
+fn points_at_items(bytes: &[u8]) -> usize {
+    let mut name = b"laszip encoded".to_vec();
+    name.resize(16, 0);
+    let user = bytes.windows(16).position(|window| window == name).unwrap();
+    user - 2 + 54 + 32
 }
