@@ -7,11 +7,9 @@
 //!
 //! * [`csv_table`] and [`table`]: `trees.csv` and its dictionary.
 //! * [`gpkg`] and [`layers`]: `trees.gpkg`.
-//! * [`geotiff`], [`vrt`], [`mosaic`], [`chm`], [`closing`]: rasters larger than memory.
+//! * [`geotiff`], [`vrt`], [`mosaic`]: rasters larger than memory.
 //! * [`las`]: point files with extra dimensions.
 
-pub mod chm;
-pub mod closing;
 pub mod crs;
 pub mod csv_table;
 pub mod error;
@@ -25,8 +23,7 @@ pub mod sorted_trees;
 pub mod stage;
 pub mod table;
 pub mod vrt;
-pub mod window;
 
 pub use error::Error;
 pub use mosaic::Mosaic;
-pub use window::Window;
+pub use timberline_pointcloud::Window;

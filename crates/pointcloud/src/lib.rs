@@ -18,15 +18,18 @@
 //! ```
 
 pub mod bounds;
+pub mod closing;
 pub mod cloud;
 pub mod column;
 pub mod error;
 pub mod frame;
 pub mod grid;
+pub mod gridding;
 pub mod nearest;
 pub mod order;
 pub mod sites;
 pub mod tiling;
+pub mod window;
 
 pub use bounds::{Bounds3, Rect};
 pub use cloud::{Point, PointCloud};
@@ -37,3 +40,4 @@ pub use grid::{Grid2, Grid3};
 pub use nearest::{Nearest2, Nearest3};
 pub use sites::Footprint;
 pub use tiling::{TileGrid, TileId};
+pub use window::Window;

@@ -4,12 +4,13 @@ use super::Params;
 use super::survey::Survey;
 use crate::crs::unit_name;
 use crate::geotiff::{RasterSpec, Source, write_raster};
-use crate::{Error, Mosaic, Window, chm, closing, vrt};
+use crate::{Error, Mosaic, Window, vrt};
 use std::fs::File;
 use std::io::BufWriter;
 use timberline_artefact::stage::{Context, StageError};
 use timberline_artefact::{Crs, OutputFolder};
 use timberline_pointcloud::sites::file_name;
+use timberline_pointcloud::{closing, gridding};
 
 /// Writes both rasters.
 pub(super) fn write(
@@ -94,7 +95,7 @@ impl Product {
 fn canopy_values(canopy: &mut Mosaic, window: Window, params: &Params) -> Result<Vec<f32>, Error> {
     let reach = (params.chm_fill_m / params.chm_cell_m).round() as u32;
     let values = canopy.read(window.grown(reach))?;
-    Ok(chm::fill_gaps(&values, window, reach))
+    Ok(gridding::fill_gaps(&values, window, reach))
 }
 
 /// The terrain where there are points, and across gaps between them.

@@ -3,13 +3,13 @@
 use super::Params;
 use crate::las::{Colour, Dimension, DimensionType, is_standard_field};
 use crate::sorted_trees::SortedTrees;
-use crate::{Error, Mosaic, Window, chm};
+use crate::{Error, Mosaic, Window};
 use std::collections::BTreeMap;
 use std::path::Path;
 use timberline_artefact::kinds::{GroundModel, Heights, PointTile, Trees};
 use timberline_artefact::stage::{Context, Inputs, StageError};
 use timberline_artefact::{Crs, Facts, Header, Kind};
-use timberline_pointcloud::{Bounds3, Column, Footprint, PointCloud, TileGrid, TileId};
+use timberline_pointcloud::{Bounds3, Column, Footprint, PointCloud, TileGrid, TileId, gridding};
 
 /// Seconds in a week: GPS times beyond it cannot be seconds of the week.
 const WEEK_S: f64 = 604_800.0;
@@ -92,7 +92,7 @@ impl Survey {
             self.footprint.include(world[0], world[1]);
         }
         if params.write_rasters {
-            let (window, values) = chm::highest(&cloud, &heights.height_m, params.chm_cell_m);
+            let (window, values) = gridding::highest(&cloud, &heights.height_m, params.chm_cell_m);
             self.chm.push(window, &values)?;
         }
         Ok(())

@@ -1,6 +1,6 @@
 //! Where a raster may show a value: on and between the data, not beyond.
 //!
-//! A terrain model has values wherever it is asked. What is drawn of it is the morphological closing
+//! A model of a surface has values wherever it is asked. What is shown of it is the morphological closing
 //! (Serra 1982, chapter II) of the cells with points by a square: gaps narrower than the square are
 //! covered, wide ones (lakes, the surroundings of the survey) are not.
 

@@ -1,6 +1,6 @@
 //! Rectangles of cells on the world lattice of a raster.
 
-use timberline_pointcloud::Rect;
+use crate::Rect;
 
 /// A rectangle of lattice cells: cell (column, row) covers `[column * cell, (column + 1) * cell)`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

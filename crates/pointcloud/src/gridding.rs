@@ -1,17 +1,16 @@
-//! The canopy height model: the highest point of every cell.
+//! Points to rasters: the highest value of every cell, and small gaps filled.
 
-use crate::Window;
-use timberline_pointcloud::{PointCloud, Rect};
+use crate::{PointCloud, Rect, Window};
 
-/// ASPRS classes of low and high noise: not canopy.
+/// ASPRS classes of low and high noise: no surface.
 const NOISE: [u8; 2] = [7, 18];
 
-/// Highest height above ground in every cell that a cloud touches; NaN where there is no point.
+/// Highest value in every cell that a cloud touches; NaN where there is no point.
 ///
-/// `height_m` is the height above ground of every point (NaN: unknown, left out). Points below
-/// the ground surface count as 0. Noise classes are left out.
+/// `values` are those of the points, heights above ground say (NaN: unknown, left out); negative
+/// ones count as 0. Noise classes are left out.
 #[must_use]
-pub fn highest(cloud: &PointCloud, height_m: &[f32], cell_m: f64) -> (Window, Vec<f32>) {
+pub fn highest(cloud: &PointCloud, values: &[f32], cell_m: f64) -> (Window, Vec<f32>) {
     let cell = |index: usize| {
         let [x, y, _] = cloud.world(index);
         [(x / cell_m).floor() as i64, (y / cell_m).floor() as i64]
@@ -25,15 +24,15 @@ pub fn highest(cloud: &PointCloud, height_m: &[f32], cell_m: f64) -> (Window, Ve
         return (Window { column0: 0, row0: 0, columns: 0, rows: 0 }, Vec::new());
     }
     let window = Window::touching(&rect, cell_m);
-    let mut values = vec![f32::NAN; window.len()];
-    for (index, height) in height_m.iter().enumerate().take(cloud.len()) {
-        if !height.is_nan() && !NOISE.contains(&cloud.classification[index]) {
+    let mut highest = vec![f32::NAN; window.len()];
+    for (index, value) in values.iter().enumerate().take(cloud.len()) {
+        if !value.is_nan() && !NOISE.contains(&cloud.classification[index]) {
             let [column, row] = cell(index);
-            let value = &mut values[window.index(column, row)];
-            *value = value.max(height.max(0.0));
+            let cell = &mut highest[window.index(column, row)];
+            *cell = cell.max(value.max(0.0));
         }
     }
-    (window, values)
+    (window, highest)
 }
 
 /// Fills small gaps: an empty cell with occupied cells within `reach` cells in at least three of the
@@ -96,7 +95,7 @@ fn quadrant(dx: i64, dy: i64) -> u8 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use timberline_pointcloud::{Frame, Point};
+    use crate::{Frame, Point};
 
     #[test]
     fn the_highest_point_counts_and_noise_does_not() {
