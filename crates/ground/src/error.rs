@@ -37,12 +37,10 @@ pub enum Error {
     /// A parameter out of its range.
     #[error("{0}")]
     Parameter(String),
-    /// A triangulation refused a point.
-    #[error("point {index} cannot enter the triangulation: {reason}")]
+    /// A triangulation refused its vertices.
+    #[error("the ground vertices cannot be triangulated: {reason}")]
     Triangulation {
-        /// Index of the point among those of its block.
-        index: usize,
-        /// What the triangulation said.
+        /// What is wrong with them.
         reason: String,
     },
     /// A grid or kd-tree refused its input.

@@ -1,5 +1,7 @@
 //! Ground classification, the Hardy multiquadric terrain model and heights above ground.
 
+pub mod cells;
+pub mod classify;
 pub mod dense;
 pub mod error;
 pub mod hardy;
@@ -8,12 +10,16 @@ pub mod nodes;
 pub mod params;
 pub mod patch;
 mod projection;
+pub mod ptd;
 pub mod quadtree;
+mod rim;
 pub mod surface;
+pub mod tin;
 pub mod tuning;
 
+pub use classify::{Label, classify};
 pub use error::Error;
 pub use hardy::{Hardy, Kernel, Sample, Trend};
 pub use nodes::Nodes;
-pub use params::{DtmParams, Tuning};
+pub use params::{DtmParams, GroundParams, Returns, Source, Tuning};
 pub use surface::Surface;

@@ -14,6 +14,80 @@ pub enum Tuning {
     Given,
 }
 
+/// Where ground points come from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// The supplier's class 2 in blocks where it covers the area, classification in the others.
+    Auto,
+    /// The supplier's class 2.
+    Use,
+    /// Classification, whatever the supplier's classes.
+    Classify,
+}
+
+/// Which returns may be ground.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Returns {
+    /// Last returns; a return number of 0 (not recorded) counts as last.
+    Last,
+    /// Every return.
+    All,
+}
+
+/// Parameters of the ground classification.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GroundParams {
+    /// Where ground points come from.
+    pub source: Source,
+    /// Which returns may be ground.
+    pub returns: Returns,
+    /// Edge of the world-fixed blocks that are classified one by one.
+    pub block_m: f64,
+    /// How far beyond a block points are considered.
+    pub buffer_m: f64,
+    /// Edge of the cells whose lowest points are the first ground.
+    pub seed_cell_m: f64,
+    /// Largest distance from a triangle at the coarsest level.
+    pub coarse_distance_m: f64,
+    /// Largest distance from a triangle at the finest level.
+    pub fine_distance_m: f64,
+    /// Largest angle at the coarsest level.
+    pub coarse_angle_deg: f64,
+    /// Largest angle at the finest level.
+    pub fine_angle_deg: f64,
+    /// Slope to all neighbours above which a ground vertex is taken back.
+    pub spike_deg: f64,
+    /// Height above the neighbours' plane from which a vertex is trimmed at the end.
+    pub trim_m: f64,
+    /// What is added to it per metre of distance of the neighbours.
+    pub trim_slope: f64,
+    /// Distance from the final triangulation within which points are ground.
+    pub tolerance_m: f64,
+}
+
+impl Default for GroundParams {
+    fn default() -> Self {
+        Self {
+            source: Source::Auto,
+            returns: Returns::Last,
+            block_m: 64.0,
+            buffer_m: 24.0,
+            seed_cell_m: 32.0,
+            coarse_distance_m: 6.0,
+            fine_distance_m: 0.3,
+            coarse_angle_deg: 30.0,
+            fine_angle_deg: 15.0,
+            spike_deg: 25.0,
+            trim_m: 0.12,
+            trim_slope: 0.08,
+            tolerance_m: 0.08,
+        }
+    }
+}
+
 /// Parameters of the terrain model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
