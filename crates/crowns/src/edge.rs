@@ -3,13 +3,14 @@
 use timberline_pointcloud::Grid2;
 
 /// Width of the ring around the crown in which points are looked for, m.
-pub const MARGIN_M: f64 = 2.0;
+pub const MARGIN_M: f64 = 3.0;
 
 /// Directions looked into.
 const SECTORS: usize = 16;
 
-/// Neighbouring directions without any point that make an edge: 67.5 degrees.
-const EMPTY_RUN: usize = 3;
+/// Neighbouring directions without any point that make an edge: 45 degrees, 3 m² even around
+/// the smallest crowns, so that a scan of 1.6 points/m² is not taken for its own edge.
+const EMPTY_RUN: usize = 2;
 
 /// Whether the ring of [`MARGIN_M`] around a crown has no points at all, of whatever kind, in
 /// [`EMPTY_RUN`] neighbouring sectors: the scan then ends there (or has a hole: open water, say).
@@ -71,7 +72,7 @@ mod tests {
             at_survey_edge([&x, &y], &Grid2::new(&x, &y, 2.0).unwrap(), [0.1, 0.1], 2.0)
         };
         assert!(!judge(-30));
-        assert!(judge(-4), "the scan ends 2 m west of the apex");
+        assert!(judge(-3), "the scan ends 1.6 m west of the apex, the crown 2 m");
         assert!(!judge(-9));
     }
 }

@@ -85,7 +85,8 @@ pub struct CrownModelParams {
     /// Points lower than this above the ground are in no crown.
     #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub min_height_m: f64,
-    /// Points nearer to the surface than this (measured vertically) are inliers.
+    /// Points nearer to the surface than this are inliers: at right angles to the surface for the
+    /// method `two-parameter`, vertically for the paper's models.
     #[schemars(range(min = 0.01, max = 10.0), extend("x-unit" = "m", "x-source" = "Tittmann et al. 2011, section 3 (epsilon)"))]
     pub tolerance_m: f64,
     /// Probability that at least one draw is of inliers only.
@@ -130,16 +131,16 @@ impl Default for CrownModelParams {
             window_per_height: 0.5,
             returns: Returns::First,
             min_height_m: 1.0,
-            tolerance_m: 0.8,
+            tolerance_m: 0.6,
             confidence: 0.99,
             inlier_share: 0.2,
             scored_points: 800,
             radius_rule: RadiusRule::Contiguous,
             radius_quantile: 0.95,
-            outlier_cost: 0.5,
+            outlier_cost: 0.35,
             outlier_scope: OutlierScope::Radius,
             min_inliers: 4,
-            max_outlier_ratio: 4.0,
+            max_outlier_ratio: 2.0,
         }
     }
 }
@@ -157,6 +158,7 @@ impl CrownModelParams {
             radius_rule: RadiusRule::Farthest,
             outlier_scope: OutlierScope::Window,
             max_outlier_ratio: 10.0,
+            tolerance_m: 0.8,
             ..Self::default()
         }
     }

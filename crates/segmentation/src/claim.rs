@@ -16,6 +16,9 @@ pub struct Crown {
     pub radius_m: f64,
     /// A point nearer to the surface than this is on it, m.
     pub tolerance_m: f64,
+    /// Whether that is measured at right angles to the surface (to first order: the vertical
+    /// residual times the cosine of the slope) or vertically.
+    pub oblique: bool,
 }
 
 /// A tree's claim on a point.
@@ -52,10 +55,12 @@ impl Crown {
             return None;
         }
         let r = squared.sqrt();
-        let depth = r * (self.coefficients[0] + self.coefficients[1] * r);
-        let below = self.apex[2] - z - depth;
-        let score = if below.abs() < self.tolerance_m {
-            1.0 - 0.5 * below.abs() / self.tolerance_m
+        let [b1, b2] = self.coefficients;
+        let below = self.apex[2] - z - r * (b1 + b2 * r);
+        let slope = if self.oblique { b1 + 2.0 * b2 * r } else { 0.0 };
+        let distance = below.abs() / (1.0 + slope * slope).sqrt();
+        let score = if distance < self.tolerance_m {
+            1.0 - 0.5 * distance / self.tolerance_m
         } else if params.membership == Membership::Volume && below > -params.above_m {
             0.5 / (1.0 + r / self.radius_m)
         } else {
@@ -111,7 +116,14 @@ mod tests {
     use proptest::prelude::*;
 
     fn crown(id: u64, x: f64, z: f64, radius_m: f64) -> Crown {
-        Crown { id, apex: [x, 0.0, z], coefficients: [1.0, 0.0], radius_m, tolerance_m: 0.5 }
+        Crown {
+            id,
+            apex: [x, 0.0, z],
+            coefficients: [1.0, 0.0],
+            radius_m,
+            tolerance_m: 0.5,
+            oblique: false,
+        }
     }
 
     fn tree_at(crowns: &[Crown], at: [f64; 3]) -> Claim {
@@ -129,6 +141,16 @@ mod tests {
         assert_eq!(tree_at(&tree, [2.0, 0.0, 9.6]).id, 0, "another tree's");
         assert_eq!(tree_at(&tree, [3.1, 0.0, 7.0]).id, 0, "beyond the radius");
         assert_eq!(tree_at(&tree, [0.0, 0.0, 0.9]).id, 0, "on the ground");
+    }
+
+    #[test]
+    fn a_steep_flank_is_measured_across() {
+        let params = SegmentationParams { membership: Membership::Surface, ..Default::default() };
+        let upright = Crown { coefficients: [4.0, 0.0], ..crown(7, 0.0, 20.0, 3.0) };
+        let oblique = Crown { oblique: true, ..upright };
+        let beside = [2.0, 0.0, 11.0];
+        assert_eq!(upright.claim(beside, &params), None, "1 m below");
+        assert!(oblique.claim(beside, &params).is_some(), "0.24 m across");
     }
 
     #[test]
@@ -183,7 +205,7 @@ mod tests {
                 let mut crowns: Vec<Crown> = trees.iter().enumerate().map(|(i, t)| Crown {
                     id: i as u64 + 1,
                     apex: [f64::from(t.0) * 0.25 + origin, f64::from(t.1) * 0.25 + origin, f64::from(t.2) * 0.25],
-                    coefficients: [0.5, 0.25], radius_m: f64::from(t.3) * 0.25, tolerance_m: 0.5,
+                    coefficients: [0.5, 0.25], radius_m: f64::from(t.3) * 0.25, tolerance_m: 0.5, oblique: t.3 % 2 == 0,
                 }).collect();
                 if reversed { crowns.reverse(); }
                 let column = |f: &dyn Fn(&(i32, i32, i32)) -> f64| points.iter().map(f).collect::<Vec<f64>>();

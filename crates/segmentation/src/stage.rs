@@ -1,7 +1,7 @@
 //! The stage `segmentation`: the only place here that reads and writes artefacts.
 
 use crate::{Claim, Crown, SegmentationParams, label};
-use timberline_artefact::kinds::{CrownModel, CrownModels, CrownStatus, Labels};
+use timberline_artefact::kinds::{CrownModel, CrownModels, CrownShape, CrownStatus, Labels};
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
@@ -67,6 +67,7 @@ fn crown(model: &CrownModel, frame: &Frame) -> Option<Crown> {
         coefficients: model.coefficients(),
         radius_m: model.radius_m,
         tolerance_m: model.tolerance_m,
+        oblique: model.shape == CrownShape::Mixed,
     })
 }
 

@@ -19,7 +19,8 @@ pub enum CrownShape {
     Cone,
     /// h = alpha r^2 + (1 - alpha) r.
     Blend,
-    /// h = b1 r + b2 r^2.
+    /// h = b1 r + b2 r^2; the only one whose residuals are at right angles to the surface (the
+    /// vertical residual times the cosine of the slope), all others being vertical.
     #[default]
     Mixed,
 }

@@ -21,10 +21,10 @@ pub struct Extent {
     pub points: usize,
 }
 
-/// What a point with a residual is worth, by the loss of MSAC (Torr and Zisserman 2000): an inlier
-/// gains 1 - (residual / tolerance)², an outlier costs a constant.
-fn gain(residual: f64, inverse_tolerance: f64, outlier_cost: f64) -> f64 {
-    let scaled = residual * inverse_tolerance;
+/// What a point at a distance from the surface is worth, by the loss of MSAC (Torr and Zisserman 2000): an inlier
+/// gains 1 - (distance / tolerance)², an outlier costs a constant.
+fn gain(distance: f64, inverse_tolerance: f64, outlier_cost: f64) -> f64 {
+    let scaled = distance * inverse_tolerance;
     let square = scaled * scaled;
     if square < 1.0 { 1.0 - square } else { -outlier_cost }
 }
@@ -46,7 +46,7 @@ impl Scoring {
                 break;
             }
             for (j, (&r, &h)) in rs.iter().zip(hs).enumerate() {
-                sum += gain(model.residual(r, h), inverse, self.outlier_cost);
+                sum += gain(model.distance(r, h), inverse, self.outlier_cost);
                 if sum > best.score {
                     best = Extent { score: sum, points: k * STRIDE + j + 1 };
                 }
@@ -55,10 +55,10 @@ impl Scoring {
         (best.score > at_least).then_some(best)
     }
 
-    /// Whether a residual is an inlier's.
+    /// Whether a point at a distance from the surface is an inlier.
     #[must_use]
-    pub fn is_inlier(&self, residual: f64) -> bool {
-        residual.abs() < self.tolerance_m
+    pub fn is_inlier(&self, distance: f64) -> bool {
+        distance.abs() < self.tolerance_m
     }
 }
 
@@ -90,7 +90,7 @@ mod tests {
             let model = Shape::Cone.model(b1);
             let (mut sum, mut best) = (0.0, Extent { score: 0.0, points: 0 });
             for i in 0..window.len() {
-                sum += gain(model.residual(window.r[i], window.h[i]), 2.0, 1.0);
+                sum += gain(model.distance(window.r[i], window.h[i]), 2.0, 1.0);
                 if sum > best.score { best = Extent { score: sum, points: i + 1 }; }
             }
             prop_assert_eq!(SCORING.extent(&model, &window, floor), (best.score > floor).then_some(best));

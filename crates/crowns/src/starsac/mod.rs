@@ -13,7 +13,7 @@ mod two_parameter;
 
 pub use consensus::{Consensus, draws, exact, sampled};
 pub use extent::{Extent, Scoring};
-pub use lad::refine as least_absolute_deviations;
+pub use lad::{Row, refine as least_absolute_deviations};
 pub use model::{Interval, Model, Shape};
 pub use two_parameter::{Effort, search as search_two_parameter, through_two};
 
@@ -58,7 +58,7 @@ pub struct CrownModel {
     pub inliers: Vec<u32>,
     /// Number of outliers, within the radius or in the window as the parameters say.
     pub outliers: u32,
-    /// Mean absolute residual of the inliers, m.
+    /// Mean distance of the inliers from the surface ([`Model::distance`]), m.
     pub mean_residual_m: f64,
 }
 
@@ -193,7 +193,7 @@ fn with_extent(
     let mut inliers = Vec::new();
     let mut sum = 0.0;
     for place in 0..points {
-        let residual = model.residual(window.r[place], window.h[place]).abs();
+        let residual = model.distance(window.r[place], window.h[place]).abs();
         if residual < params.tolerance_m {
             inliers.push(place as u32);
             sum += residual;

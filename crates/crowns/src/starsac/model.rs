@@ -41,6 +41,27 @@ impl Model {
     pub fn residual(&self, r: f64, h: f64) -> f64 {
         h - self.depth(r)
     }
+
+    /// The measure in which a point is near the surface or not, m; negative above it.
+    ///
+    /// The paper's models measure vertically. On the flank of a conifer, falling 5 m per metre, an
+    /// echo that is off by the width of its footprint is then metres off: the two-parameter model
+    /// measures at right angles to the surface (to first order), so that one tolerance fits steep
+    /// and flat crowns alike.
+    #[must_use]
+    pub fn distance(&self, r: f64, h: f64) -> f64 {
+        match self.shape {
+            Shape::TwoParameter => self.residual(r, h) * self.obliquity(r),
+            _ => self.residual(r, h),
+        }
+    }
+
+    /// Cosine of the surface's slope at a distance from the axis.
+    #[must_use]
+    pub fn obliquity(&self, r: f64) -> f64 {
+        let slope = self.b1 + 2.0 * self.b2 * r;
+        1.0 / (1.0 + slope * slope).sqrt()
+    }
 }
 
 /// The parameter values for which a point is an inlier.

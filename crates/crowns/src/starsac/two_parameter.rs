@@ -1,7 +1,7 @@
 //! The default model: `h = b1 r + b2 r²`, b1, b2 >= 0, by MSAC with an extent and L1 refinement.
 
 use super::extent::{Extent, Scoring};
-use super::lad;
+use super::lad::{self, Row};
 use super::model::{Model, Shape};
 use crate::Window;
 use rand_chacha::ChaCha8Rng;
@@ -9,6 +9,11 @@ use rand_chacha::rand_core::Rng;
 
 /// Refinements after which the set of inliers is taken as settled.
 const MAX_REFINEMENTS: usize = 4;
+
+/// Share of its score a refined surface must keep. MSAC's squares are drawn to the echoes from inside
+/// the crown, all on one side, so the better surface scores a little less; one that loses more has
+/// left the crown.
+const KEPT_SCORE: f64 = 0.8;
 
 /// How hard the search works.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -41,7 +46,7 @@ pub fn through_two(near: (f64, f64), far: (f64, f64)) -> Option<Model> {
 ///
 /// Trials pass through pairs of points drawn evenly over the distance (an even draw over the
 /// points would take most from the rim, where other crowns begin). The best is refined by least
-/// absolute deviations on its inliers as long as its score grows.
+/// absolute deviations on its inliers.
 #[must_use]
 pub fn search(
     window: &Window,
@@ -100,22 +105,23 @@ fn pick_inward(random: &mut ChaCha8Rng, len: usize) -> usize {
     (scaled as usize).min(len - 1)
 }
 
-/// Least absolute deviations on the inliers, repeated while the score grows.
+/// Least absolute deviations on the inliers, a few times over as the inliers change.
 fn refined(mut best: (Model, Extent), window: &Window, scoring: &Scoring) -> (Model, Extent) {
     for _ in 0..MAX_REFINEMENTS {
         let (model, extent) = best;
-        let (mut r, mut h) = (Vec::with_capacity(extent.points), Vec::with_capacity(extent.points));
-        for place in 0..extent.points {
-            if scoring.is_inlier(model.residual(window.r[place], window.h[place])) {
-                r.push(window.r[place]);
-                h.push(window.h[place]);
-            }
-        }
-        let [b1, b2] = lad::refine(&r, &h, [model.b1, model.b2]);
+        let inlier =
+            |&place: &usize| scoring.is_inlier(model.distance(window.r[place], window.h[place]));
+        let row = |place: usize| {
+            let (r, h) = (window.r[place], window.h[place]);
+            let weight = model.obliquity(r);
+            Row { u: weight * r, v: weight * r * r, target: weight * h }
+        };
+        let rows: Vec<Row> = (0..extent.points).filter(inlier).map(row).collect();
+        let [b1, b2] = lad::refine(&rows, [model.b1, model.b2]);
         let next = Model { shape: Shape::TwoParameter, b1, b2 };
-        match scoring.extent(&next, window, extent.score) {
-            Some(extent) => best = (next, extent),
-            None => break,
+        match scoring.extent(&next, window, KEPT_SCORE * extent.score) {
+            Some(extent) if next != model => best = (next, extent),
+            _ => break,
         }
     }
     best

@@ -70,8 +70,9 @@ pub(crate) fn scan(
         .collect()
 }
 
-/// A tree at the origin with up to five neighbours at their distance, and its scan.
-pub(crate) fn stand(seed: u64, per_m2: f64) -> (TrueCrown, Vec<[f64; 3]>) {
+/// A tree at the origin with up to five neighbours at their distance, and its scan; with an echo
+/// exactly on the apex if `apex_echo`.
+pub(crate) fn stand(seed: u64, per_m2: f64, apex_echo: bool) -> (TrueCrown, Vec<[f64; 3]>) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let target = TrueCrown::random(&mut random, 0.0, 0.0);
     let mut crowns = vec![target];
@@ -83,7 +84,12 @@ pub(crate) fn stand(seed: u64, per_m2: f64) -> (TrueCrown, Vec<[f64; 3]>) {
         other.apex = [distance * cos, distance * sin, other.apex[2]];
         crowns.push(other);
     }
-    (target, scan(&crowns, 10.0, per_m2, &mut random))
+    let mut points = scan(&crowns, 10.0, per_m2, &mut random);
+    if apex_echo {
+        points.retain(|p| p[2] < target.apex[2]);
+        points.push(target.apex.map(timberline_pointcloud::frame::quantise));
+    }
+    (target, points)
 }
 
 /// The window around a crown's highest echo within half a metre of its axis; that echo's position.
