@@ -120,6 +120,15 @@ impl Crown {
         (rho < 1.0).then(|| self.top_m[2] - depth)
     }
 
+    /// Whether a position of the plane is near enough for [`Self::surface_z_m`] to be worth asking.
+    pub(crate) fn may_cover(&self, x_m: f64, y_m: f64) -> bool {
+        let half = 0.5 * self.upper_m;
+        let [cx, cy] = self.centre_m(half);
+        let reach = self.semi_axes_m[0] + half * (self.axis[0].abs() + self.axis[1].abs());
+        let (dx, dy) = (x_m - cx, y_m - cy);
+        dx * dx + dy * dy < reach * reach
+    }
+
     /// Centre of the widest section, m.
     #[must_use]
     pub fn widest_centre_m(&self) -> [f64; 2] {

@@ -56,6 +56,7 @@ fn covered(trees: &[Tree], canopy: &Canopy, own: usize, [x, y, z]: [f64; 3]) -> 
         let crown = &trees[other as usize].crown;
         other as usize != own
             && crown.top_m[2] > z
+            && crown.may_cover(x, y)
             && crown.surface_z_m(x, y).is_some_and(|surface| surface > z)
     })
 }

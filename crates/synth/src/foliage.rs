@@ -5,9 +5,12 @@
 //! branches of uneven length. Beams find their way by free-flight sampling with null collisions
 //! (Woodcock et al. 1965), which is exact for any density below its bound.
 
-use crate::random::{Stream, hash_cell, unit_of};
+use crate::random::{Stream, hash_cell, unit_of, whole};
 use crate::species::Foliage;
 use crate::{Crown, Tree};
+
+/// Depth under the upper surface at which a crown is as thin as around its axis, m.
+const HEART_M: f64 = 2.5;
 
 /// A beam or part of one: a position and a unit direction that goes down.
 #[derive(Debug, Clone, Copy)]
@@ -38,6 +41,9 @@ pub(crate) struct Optics {
     crown: Crown,
     foliage: &'static Foliage,
     salt: u64,
+    /// Cells of the clump lattice per unit of the crown's coordinates.
+    clumps: [f64; 3],
+    whorls_per_m: f64,
     stem_base: [f64; 3],
     stem_axis: [f64; 2],
     stem_radius_m: f64,
@@ -60,10 +66,14 @@ impl Optics {
     pub(crate) fn new(tree: &Tree, salt: u64) -> Self {
         let top = tree.crown.top_m;
         let per_metre = |axis: usize| (tree.base_m[axis] - top[axis]) / tree.height_m;
+        let foliage = &tree.species.traits().foliage;
+        let [a, b] = tree.crown.semi_axes_m;
         Self {
             crown: tree.crown,
-            foliage: &tree.species.traits().foliage,
+            foliage,
             salt,
+            clumps: [a, b, 1.0].map(|metres| metres / foliage.clump_m),
+            whorls_per_m: 1.0 / foliage.whorl_m,
             stem_base: tree.base_m,
             stem_axis: [per_metre(0), per_metre(1)],
             // Between breast height and the crown a stem is thinner than at breast height.
@@ -103,9 +113,12 @@ impl Optics {
         let nearest = passage.nearest(start, depth, end).min(1.0).sqrt();
         depth = depth.max(crown.upper_m * crown.profile.depth(nearest));
         let end = end.min((limit - passage.top_range) / passage.stretch);
+        if depth >= end {
+            return None;
+        }
         let flight = 1.0 / (self.foliage.extinction_per_m * passage.stretch);
         loop {
-            depth += stream.exponential() * flight;
+            depth += stream.flight() * flight;
             if depth >= end {
                 return None;
             }
@@ -121,13 +134,15 @@ impl Optics {
     /// Foliage density relative to the largest of its species.
     fn density(&self, u: f64, v: f64, depth: f64) -> f64 {
         let (crown, foliage) = (&self.crown, self.foliage);
+        let cell = [u * self.clumps[0], v * self.clumps[1], depth * self.clumps[2]].map(whole);
+        if unit_of(hash_cell(cell, !self.salt)) < foliage.porosity {
+            return 0.0;
+        }
         let rho = (u * u + v * v).sqrt();
-        let [a, b] = crown.semi_axes_m;
-        let storey = (depth - foliage.droop * rho * a) / foliage.whorl_m;
-        let whorl = storey.floor();
-        let sector = (diamond_angle(u, v) * 0.25 * foliage.branches) as i32;
-        let branch = hash_cell([whorl as i32, sector, 0], self.salt);
-        let reach = rho / (1.0 - foliage.roughness * unit_of(branch));
+        let storey = (depth - foliage.droop * rho * crown.semi_axes_m[0]) * self.whorls_per_m;
+        let whorl = whole(storey);
+        let branch = hash_cell([whorl, octant(u, v), 0], self.salt);
+        let reach = rho * (1.0 + foliage.roughness * unit_of(branch));
         let below = depth - crown.upper_m;
         if reach >= 1.0 || (below > 0.0 && below > crown.lower_m * (1.0 - reach * reach).sqrt()) {
             return 0.0;
@@ -136,12 +151,8 @@ impl Optics {
         if under_surface < 0.0 {
             return 0.0;
         }
-        let cell = [u * a, v * b, depth].map(|metres| (metres / foliage.clump_m).floor() as i32);
-        if unit_of(hash_cell(cell, !self.salt)) < foliage.porosity {
-            return 0.0;
-        }
-        let outside = (reach * reach).max(1.0 / (1.0 + 0.5 * under_surface * under_surface));
-        let between = 1.0 - (2.0 * (storey - whorl) - 1.0).abs();
+        let outside = (reach * reach).max(1.0 - under_surface * (1.0 / HEART_M));
+        let between = 1.0 - (2.0 * (storey - f64::from(whorl)) - 1.0).abs();
         (foliage.inner + (1.0 - foliage.inner) * outside) * (1.0 - foliage.layering * between)
     }
 
@@ -199,20 +210,9 @@ impl Passage {
     }
 }
 
-/// A monotonic stand-in for the angle of a direction, from 0 to 4 over a full turn.
-fn diamond_angle(u: f64, v: f64) -> f64 {
-    let size = u.abs() + v.abs();
-    if size == 0.0 {
-        return 0.0;
-    }
-    let turn = v / size;
-    if u < 0.0 {
-        2.0 - turn
-    } else if v < 0.0 {
-        4.0 + turn
-    } else {
-        turn
-    }
+/// Which eighth of a full turn a direction lies in.
+fn octant(u: f64, v: f64) -> i32 {
+    i32::from(u < 0.0) + 2 * i32::from(v < 0.0) + 4 * i32::from(u.abs() < v.abs())
 }
 
 #[cfg(test)]
@@ -277,13 +277,16 @@ mod tests {
     }
 
     #[test]
-    fn the_diamond_turns_once() {
-        let mut before = -1.0;
-        for step in 0..360 {
-            let (sin, cos) = libm::sincos(f64::from(step).to_radians());
-            let angle = diamond_angle(cos, sin);
-            assert!(angle > before && angle < 4.0);
-            before = angle;
-        }
+    fn octants_divide_the_turn() {
+        let octants: std::collections::BTreeSet<i32> = (0..8)
+            .map(|eighth| {
+                let at =
+                    |degrees: f64| libm::sincos((f64::from(eighth) * 45.0 + degrees).to_radians());
+                let ((sin, cos), (later_sin, later_cos)) = (at(1.0), at(44.0));
+                assert_eq!(octant(cos, sin), octant(later_cos, later_sin));
+                octant(cos, sin)
+            })
+            .collect();
+        assert_eq!(octants.len(), 8);
     }
 }

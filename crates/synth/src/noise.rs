@@ -2,7 +2,7 @@
 //!
 //! Polynomials only, no tables and no trigonometry: the same bits on every machine.
 
-use crate::random::{hash_cell, unit_of};
+use crate::random::{hash_cell, unit_of, whole};
 
 /// Quintic fade and its derivative (Perlin 2002, Improving noise).
 fn fade(t: f64) -> (f64, f64) {
@@ -17,9 +17,8 @@ fn slope(column: i32, row: i32, salt: u64) -> [f64; 2] {
 
 /// Gradient noise in the plane: value (about -0.8 to 0.8) and gradient, at unit wavelength.
 pub(crate) fn gradient_noise(x: f64, y: f64, salt: u64) -> (f64, [f64; 2]) {
-    let (column, row) = (x.floor(), y.floor());
-    let (fx, fy) = (x - column, y - row);
-    let (i, j) = (column as i32, row as i32);
+    let (i, j) = (whole(x), whole(y));
+    let (fx, fy) = (x - f64::from(i), y - f64::from(j));
     let ((u, du), (v, dv)) = (fade(fx), fade(fy));
     let g00 = slope(i, j, salt);
     let g10 = slope(i + 1, j, salt);
@@ -42,10 +41,10 @@ pub(crate) fn gradient_noise(x: f64, y: f64, salt: u64) -> (f64, [f64; 2]) {
 
 /// Value noise on a line: value in [-1, 1] and derivative, at unit wavelength.
 pub(crate) fn line_noise(t: f64, salt: u64) -> (f64, f64) {
-    let cell = t.floor();
+    let cell = whole(t);
     let knot = |index: i32| 2.0 * unit_of(hash_cell([index, 0, 1], salt)) - 1.0;
-    let (low, high) = (knot(cell as i32), knot(cell as i32 + 1));
-    let (u, du) = fade(t - cell);
+    let (low, high) = (knot(cell), knot(cell + 1));
+    let (u, du) = fade(t - f64::from(cell));
     (low + u * (high - low), du * (high - low))
 }
 

@@ -139,7 +139,7 @@ pub fn measure(
     for site in sites {
         match site.kind {
             PlotKind::Fixed { radius_m } => {
-                check("radius_m", radius_m, 0.1..=1000.0, "0.1 to 1000 m")?
+                check("radius_m", radius_m, 0.1..=1000.0, "0.1 to 1000 m")?;
             }
             PlotKind::Variable { baf_m2_per_ha } => {
                 check("baf_m2_per_ha", baf_m2_per_ha, 0.1..=100.0, "0.1 to 100 m2/ha")?;

@@ -66,6 +66,19 @@ impl Stream {
         -libm::log((f64::from(self.rng.next_u32()) + 0.5) * (1.0 / 4_294_967_296.0))
     }
 
+    /// Exponential with mean 1 for free flights: the logarithm by a series, to 2e-5.
+    pub(crate) fn flight(&mut self) -> f64 {
+        let number = u64::from(self.rng.next_u32()) * 2 + 1;
+        let halvings = number.leading_zeros() - 31;
+        // Number over 2^33 is `scaled / 2^(halvings)` with `scaled` in [1/2, 1).
+        let scaled = (number << halvings) as f64 * (1.0 / 8_589_934_592.0);
+        // ln m = 2 atanh((m - 1)/(m + 1)) about the geometric mean of the interval.
+        let s = (scaled - SQRT_HALF) / (scaled + SQRT_HALF);
+        let q = s * s;
+        let log = 2.0 * s * (1.0 + q * (1.0 / 3.0 + q * (0.2 + q / 7.0)));
+        (f64::from(halvings) + 0.5) * std::f64::consts::LN_2 - log
+    }
+
     /// Standard normal (Box and Muller 1958).
     pub(crate) fn normal(&mut self) -> f64 {
         let radius = (2.0 * self.exponential()).sqrt();
@@ -97,6 +110,14 @@ impl Stream {
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.unit());
         [cos, sin]
     }
+}
+
+const SQRT_HALF: f64 = std::f64::consts::FRAC_1_SQRT_2;
+
+/// The whole number not above a value of moderate size. Without SSE 4.1 the standard function is a call.
+pub(crate) fn whole(value: f64) -> i32 {
+    let cut = value as i32;
+    cut - i32::from(f64::from(cut) > value)
 }
 
 /// Mixes 64 bits (the finaliser of SplitMix64, Steele, Lea and Flood 2014).
@@ -143,8 +164,19 @@ mod tests {
         near(moments(Stream::normal), 0.0, 1.0);
         near(moments(Stream::bell), 0.0, 1.0);
         near(moments(Stream::exponential), 1.0, 1.0);
+        near(moments(Stream::flight), 1.0, 1.0);
         // Weibull of shape 2: mean gamma(1.5), variance 1 - pi/4.
         near(moments(|s| s.weibull(2.0, 1.0)), 0.886_227, 0.214_602);
+    }
+
+    #[test]
+    fn flights_are_logarithms() {
+        let stream = |i| Stream::new(3, Domain::Pulse, i);
+        for i in 0..2000 {
+            let (flight, exact) = (stream(i).flight(), stream(i).exponential());
+            assert!((flight - exact).abs() < 2e-5, "{flight} {exact}");
+        }
+        assert_eq!([whole(-0.5), whole(-2.0), whole(2.9), whole(0.0)], [-1, -2, 2, 0]);
     }
 
     #[test]

@@ -61,7 +61,7 @@ pub fn als_stand_params() -> SceneParams {
         scanner: ScannerParams {
             altitude_m: 520.0,
             half_angle_deg: 15.0,
-            sidelap: 0.5,
+            sidelap: 0.58,
             heading_deg: 74.0,
             divergence_mrad: 0.5,
             ..ScannerParams::default()
@@ -77,8 +77,8 @@ fn terrain() -> TerrainParams {
         direction_deg: 76.0,
         depth_m: 7.0,
         half_width_m: 8.0,
-        meander_m: 12.0,
-        meander_wavelength_m: 70.0,
+        meander_m: 18.0,
+        meander_wavelength_m: 42.0,
     };
     let arm = Gully {
         through_m: [40.0, 150.0],
@@ -192,9 +192,14 @@ fn tile(scene: &Scene, place: [u32; 2]) -> SampleTile {
 const CAMPAIGN_TOML: &str = r#"# A virtual survey of 4.84 ha: what `cargo xtask sample` wrote. The truth is in `truth/`.
 name = "als-stand"
 platform = "als"
-scans = ["scans/*.laz"]
-crs = "EPSG:26910"
+inputs = ["scans/*.laz"]
+
+[field]
 plots = "plots.csv"
-field_trees = "field_trees.csv"
+trees = "field_trees.csv"
 stands = "stands.csv"
+
+[truth]
+trees = "truth/trees.csv"
+dtm = "truth/dtm.asc"
 "#;

@@ -76,7 +76,7 @@ impl Default for ScannerParams {
             divergence_mrad: 0.45,
             resolution_m: 2.2,
             max_returns: 5,
-            sensitivity: 0.045,
+            sensitivity: 0.06,
             range_noise_m: 0.015,
             horizontal_noise_m: 0.06,
             strip_noise_m: 0.02,

@@ -6,6 +6,7 @@ use crate::foliage::Optics;
 use crate::forest::Forest;
 use crate::pulse::{
     GroundGuess, HIGHEST_OUTLIER_M, LOWEST_OUTLIER_M, Return, Scratch, Target, Undergrowth, World,
+    passes,
 };
 use crate::random::{Domain, Stream, mix};
 use crate::scanner::{Flight, Line, ScannerParams, Sweep};
@@ -74,7 +75,7 @@ impl Scene {
             return Err(Error::EmptyArea { min, max });
         }
         params.scanner.check()?;
-        check("undergrowth cover", params.undergrowth.cover, 0.0..=0.95, "0 to 0.95")?;
+        check("undergrowth cover", params.undergrowth.cover, 0.0..=0.7, "0 to 0.7")?;
         check("undergrowth patch_m", params.undergrowth.patch_m, 0.1..=1e4, "0.1 to 10000 m")?;
         let frame = Frame::new([params.origin_m[0], params.origin_m[1], 0]);
         let terrain = Terrain::new(&params.terrain, frame, params.seed)?;
@@ -171,6 +172,7 @@ impl Scene {
             canopy: &self.forest.canopy,
             optics: &self.optics,
             undergrowth: self.params.undergrowth,
+            threshold: self.params.undergrowth.threshold(),
             salt: mix(!self.params.seed),
         }
     }
@@ -189,7 +191,7 @@ impl Scene {
             }
             let name = (u64::from(line.source_id) << 44) | flight.pulse_number(&sweep, pulse);
             let mut stream = Stream::new(self.params.seed, Domain::Pulse, name);
-            world.shoot(&ray, &flight.params, &mut stream, &mut scratch);
+            world.shoot(&ray, &view.local, &flight.params, &mut stream, &mut scratch);
             self.record(
                 line,
                 &sweep,
@@ -306,12 +308,4 @@ fn local_rect(frame: Frame, rect: &Rect) -> Rect {
         [x, y]
     };
     Rect { min: local(rect.min), max: local(rect.max) }
-}
-
-/// Whether the box around two positions touches a rectangle.
-fn passes(rect: &Rect, ends: &[[f64; 3]; 2]) -> bool {
-    let [a, b] = ends;
-    let around =
-        Rect { min: [a[0].min(b[0]), a[1].min(b[1])], max: [a[0].max(b[0]), a[1].max(b[1])] };
-    around.touches(rect)
 }

@@ -84,12 +84,10 @@ pub(crate) struct Foliage {
     pub(crate) porosity: f64,
     /// Edge of the clump lattice, m.
     pub(crate) clump_m: f64,
-    /// Share of the radius by which a branch may be shorter than the envelope.
+    /// How much further the envelope may reach than a branch, relative to the branch.
     pub(crate) roughness: f64,
     /// Vertical distance of whorls (or of storeys of boughs), m.
     pub(crate) whorl_m: f64,
-    /// Branches of a whorl.
-    pub(crate) branches: f64,
     /// How far a branch drops (positive) or rises towards its tip, share of the crown radius.
     pub(crate) droop: f64,
     /// How much thinner foliage is halfway between whorls.
@@ -104,9 +102,8 @@ const CONIFER_FOLIAGE: Foliage = Foliage {
     extinction_per_m: 1.9,
     porosity: 0.36,
     clump_m: 0.42,
-    roughness: 0.30,
+    roughness: 0.42,
     whorl_m: 0.55,
-    branches: 9.0,
     droop: 0.10,
     layering: 0.55,
     inner: 0.30,
@@ -117,9 +114,8 @@ const BROADLEAF_FOLIAGE: Foliage = Foliage {
     extinction_per_m: 1.5,
     porosity: 0.42,
     clump_m: 0.60,
-    roughness: 0.26,
+    roughness: 0.35,
     whorl_m: 1.6,
-    branches: 7.0,
     droop: -0.25,
     layering: 0.20,
     inner: 0.35,
@@ -166,7 +162,7 @@ const WESTERN_HEMLOCK: Traits = Traits {
     width_limit_in: 76.7,
     width_ratio: [0.105_59, 0.003_566_2, 0.0],
     shape: Shape { straight: [0.35, 0.65], upper: 0.9, lean_deg: 1.3, ..CONIFER_SHAPE },
-    foliage: Foliage { roughness: 0.24, layering: 0.4, droop: 0.18, ..CONIFER_FOLIAGE },
+    foliage: Foliage { roughness: 0.32, layering: 0.4, droop: 0.18, ..CONIFER_FOLIAGE },
 };
 const WESTERN_REDCEDAR: Traits = Traits {
     code: "THPL",

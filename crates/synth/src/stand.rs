@@ -134,8 +134,8 @@ impl StandParams {
         ];
         let low = vec![share(Species::PacificDogwood, 0.6), share(Species::WesternHemlock, 0.4)];
         let cohorts = vec![
-            cohort(110.0, old, [2.6, 38.0, 30.0], 0.5),
-            cohort(230.0, middle, [2.0, 15.0, 9.0], 0.6),
+            cohort(110.0, old, [2.6, 33.0, 28.0], 0.5),
+            cohort(300.0, middle, [2.0, 15.0, 9.0], 0.6),
             cohort(220.0, low, [1.6, 5.0, 4.0], 0.65),
         ];
         Self { cohorts, crown_overlap: 0.3, site: 1.0, crown_scale: 0.9 }

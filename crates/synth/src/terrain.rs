@@ -56,7 +56,7 @@ pub struct TerrainParams {
 impl Default for TerrainParams {
     /// A hillside of 12 degrees with relief at four scales.
     fn default() -> Self {
-        let relief = [(240.0, 9.0), (70.0, 2.5), (21.0, 0.5), (6.0, 0.12)];
+        let relief = [(240.0, 9.0), (70.0, 2.5), (21.0, 0.8), (6.0, 0.2)];
         Self {
             base_m: 500.0,
             slope_deg: 12.0,
