@@ -2,7 +2,12 @@
 
 use serde_json::Value;
 use std::sync::Arc;
-use timberline_artefact::stage::DynStage;
+use timberline_artefact::stage::{DynStage, erase};
+use timberline_crowns::stage::{CrownFitStage, CrownModelStage};
+use timberline_export::stage::ExportStage;
+use timberline_ingest::stage::{Scatter, Tiles};
+use timberline_segmentation::stage::SegmentationStage;
+use timberline_treetops::stage::TreetopsStage;
 
 /// A stage without its types.
 pub type AnyStage = Arc<dyn DynStage>;
@@ -30,7 +35,15 @@ impl Registry {
     /// The stages Timberline ships, in the order of the data's way through them.
     #[must_use]
     pub fn shipped() -> Self {
-        Self::new(vec![])
+        Self::new(vec![
+            erase::<Scatter>(),
+            erase::<Tiles>(),
+            erase::<TreetopsStage>(),
+            erase::<CrownModelStage>(),
+            erase::<SegmentationStage>(),
+            erase::<CrownFitStage>(),
+            erase::<ExportStage>(),
+        ])
     }
 
     /// All stages.

@@ -40,7 +40,7 @@ pub fn run(args: &Args) -> Result<u8> {
         .collect();
     if args.fix {
         for path in found.iter().map(|(path, _)| path).chain(&stray) {
-            std::fs::remove_file(path)?;
+            if path.is_dir() { std::fs::remove_dir_all(path)? } else { std::fs::remove_file(path)? }
         }
     }
     let bad = !found.is_empty() || !stray.is_empty();

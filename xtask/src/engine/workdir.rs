@@ -107,7 +107,11 @@ impl WorkDir {
     /// Removes temporary files and locks. Only to be called while nobody else is at work.
     fn sweep(&self) {
         for path in leftovers(&self.root) {
-            match std::fs::remove_file(&path) {
+            let removed = match path.is_dir() {
+                true => std::fs::remove_dir_all(&path),
+                false => std::fs::remove_file(&path),
+            };
+            match removed {
                 Ok(()) => tracing::info!("removed left-over {}", path.display()),
                 Err(error) => tracing::warn!("cannot remove {}: {error}", path.display()),
             }
@@ -115,28 +119,37 @@ impl WorkDir {
     }
 }
 
-/// Temporary files and locks below a workspace, sorted.
+/// Temporary files and folders, and locks, below a workspace, sorted.
 #[must_use]
 pub fn leftovers(root: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
-    walk(root, &mut |path| {
+    let Ok(entries) = std::fs::read_dir(root) else { return found };
+    for path in entries.filter_map(Result::ok).map(|entry| entry.path()) {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         if name.starts_with(TEMP_PREFIX) || name.ends_with(".lock") {
-            found.push(path.to_owned());
+            found.push(path);
+        } else if path.is_dir() {
+            found.extend(leftovers(&path));
         }
-    });
+    }
     found.sort();
     found
 }
 
-/// Calls `each` for every file below a folder; folders that cannot be read are passed over.
+/// Calls `each` for every file below a folder, sorted; folders that cannot be read or that hold work
+/// in progress are passed over.
 pub fn walk(folder: &Path, each: &mut dyn FnMut(&Path)) {
     let Ok(entries) = std::fs::read_dir(folder) else { return };
     let mut paths: Vec<PathBuf> =
         entries.filter_map(Result::ok).map(|entry| entry.path()).collect();
     paths.sort();
     for path in paths {
-        if path.is_dir() { walk(&path, each) } else { each(&path) }
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        if !path.is_dir() {
+            each(&path);
+        } else if !name.starts_with(TEMP_PREFIX) {
+            walk(&path, each);
+        }
     }
 }
 
