@@ -1,0 +1,135 @@
+//! The map of a site: terrain relief, canopy, crowns and treetops.
+
+use crate::canvas::{Canvas, Paint};
+use crate::colour::{INK, NO_DATA, PAPER, Rgb, VIRIDIS, lit, mix};
+use crate::figure::{Entry, Figure, Page, Symbol, draw_symbol};
+use crate::hillshade::hillshade;
+use crate::{Error, Grid};
+use timberline_artefact::Crs;
+use timberline_pointcloud::Rect;
+
+/// Heights between which the canopy's colour covers the relief, metres.
+const COVER_M: [f64; 2] = [0.5, 2.0];
+/// Share of canopy cells left out at the upper end of the ramp (single high returns).
+const LEFT_OUT: f64 = 0.002;
+/// Light on level ground is brought to this.
+const LEVEL_LIGHT: f64 = 0.88;
+/// Crowns narrower than this many pixels have no outline.
+const NARROWEST_CROWN_PX: f64 = 7.0;
+
+/// A tree on the map.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapTree {
+    /// World position of the highest point, metres.
+    pub top_m: [f64; 2],
+    /// Crown outline, world, metres; may be empty.
+    pub crown_m: Vec<[f64; 2]>,
+}
+
+/// What a map shows.
+#[derive(Debug, Clone, PartialEq)]
+pub struct MapContents<'a> {
+    /// Heading.
+    pub title: &'a str,
+    /// A line below it.
+    pub subtitle: &'a str,
+    /// The area, metres.
+    pub extent: Rect,
+    /// The CRS.
+    pub crs: &'a Crs,
+    /// Terrain, metres.
+    pub terrain: &'a Grid,
+    /// Height of the canopy above ground, metres.
+    pub canopy: &'a Grid,
+    /// The trees.
+    pub trees: &'a [MapTree],
+}
+
+/// Draws the map of a site.
+///
+/// # Errors
+/// [`Error::Empty`], [`Error::Font`].
+pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
+    let MapContents { extent, terrain, canopy, .. } = contents;
+    let top = canopy.range(LEFT_OUT).map_or(1.0, |[_, high]| high.max(1.0));
+    let mut figure = Figure::new(Page {
+        title: contents.title,
+        subtitle: contents.subtitle,
+        extent: extent.grown(extent.size()[0].max(extent.size()[1]) * 0.01),
+        detail_m: canopy.cell_m,
+        crs: contents.crs,
+        legend: legend(top, !contents.trees.is_empty()),
+    })?;
+    let light = Light { terrain: relief(terrain), canopy: relief(canopy) };
+    figure.paint(|at| pixel(at, canopy, &light, top));
+    draw_crowns(&mut figure, contents.trees);
+    draw_tops(&mut figure, contents.trees);
+    Ok(figure.finish())
+}
+
+fn legend(top: f64, has_trees: bool) -> Vec<Entry> {
+    let title = "Canopy height [m]".to_owned();
+    let mut entries = vec![Entry::Ramp { title, ramp: VIRIDIS, range: [0.0, top] }];
+    if has_trees {
+        entries.push(Entry::Symbol(Symbol::Dot(PAPER), "treetop".to_owned()));
+        entries.push(Entry::Symbol(Symbol::Ring(INK), "crown outline".to_owned()));
+    }
+    entries.push(Entry::Symbol(Symbol::Swatch(ground_colour(0.5)), "ground, shaded".to_owned()));
+    entries.push(Entry::Symbol(Symbol::Swatch(NO_DATA), "no data".to_owned()));
+    entries
+}
+
+/// Shading of the two surfaces.
+struct Light {
+    terrain: Grid,
+    canopy: Grid,
+}
+
+fn relief(surface: &Grid) -> Grid {
+    Grid { values: hillshade(surface, 1.0), cell_m: surface.cell_m, window: surface.window }
+}
+
+/// The colour of ground in a light from 0 to 1.
+fn ground_colour(light: f64) -> Rgb {
+    lit([244, 238, 226], (light / 0.5 * LEVEL_LIGHT).min(1.0))
+}
+
+fn pixel(at: [f64; 2], canopy: &Grid, light: &Light, top: f64) -> Rgb {
+    let terrain_light = light.terrain.sample(at);
+    let ground = terrain_light.map_or(NO_DATA, ground_colour);
+    let Some(height) = canopy.sample(at) else { return ground };
+    let crown_light = light.canopy.sample(at).unwrap_or(0.5);
+    // A crown stands in the light of the slope and in that of its own surface.
+    let shade = 0.55 + 0.5 * terrain_light.unwrap_or(0.5) + 0.4 * (crown_light - 0.5);
+    let crown = lit(VIRIDIS.at(height / top), shade.min(1.0) / 0.9);
+    let cover = (height - COVER_M[0]) / (COVER_M[1] - COVER_M[0]);
+    if terrain_light.is_none() { crown } else { mix(ground, crown, cover.clamp(0.0, 0.96)) }
+}
+
+fn draw_crowns(figure: &mut Figure<'_>, trees: &[MapTree]) {
+    let width = (figure.unit() / 14.0).max(1.2);
+    for tree in trees {
+        let corners: Vec<[f64; 2]> = tree.crown_m.iter().map(|corner| figure.px(*corner)).collect();
+        if extent_px(&corners) >= NARROWEST_CROWN_PX {
+            figure.canvas.outline(&corners, width + 1.2, Paint::sheer(INK, 0.28));
+            figure.canvas.outline(&corners, width, Paint::sheer(PAPER, 0.72));
+        }
+    }
+}
+
+fn extent_px(corners: &[[f64; 2]]) -> f64 {
+    let span = |axis: usize| {
+        let values = || corners.iter().map(move |corner| corner[axis]);
+        values().fold(f64::NEG_INFINITY, f64::max) - values().fold(f64::INFINITY, f64::min)
+    };
+    span(0).max(span(1))
+}
+
+fn draw_tops(figure: &mut Figure<'_>, trees: &[MapTree]) {
+    // A dot of 0.4 m where that is visible, and never larger than the legend's.
+    let radius = (0.4 * figure.px_per_m()).clamp(1.6, 0.3 * figure.unit());
+    for tree in trees {
+        let place = figure.px(tree.top_m);
+        draw_symbol(&mut figure.canvas, Symbol::Dot(PAPER), place, radius);
+    }
+}

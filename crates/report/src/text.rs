@@ -1,0 +1,165 @@
+//! Text in DejaVu Sans (Bitstream Vera licence), which comes with the program.
+
+use crate::Error;
+use crate::canvas::{Canvas, Paint};
+use ab_glyph::{Font, FontRef, PxScale, ScaleFont, point};
+
+/// Where a text stands relative to its position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Align {
+    /// It begins there.
+    Left,
+    /// Its middle is there.
+    Centre,
+    /// It ends there.
+    Right,
+}
+
+/// The two faces.
+#[derive(Debug, Clone)]
+pub struct Fonts {
+    regular: FontRef<'static>,
+    bold: FontRef<'static>,
+}
+
+/// How a text looks.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Style {
+    /// Height in pixels from the lowest descender to the highest ascender.
+    pub size: f64,
+    /// Bold or regular.
+    pub bold: bool,
+    /// Alignment.
+    pub align: Align,
+    /// Paint.
+    pub paint: Paint,
+}
+
+impl Style {
+    /// Regular, left-aligned.
+    #[must_use]
+    pub fn new(size: f64, paint: Paint) -> Self {
+        Self { size, bold: false, align: Align::Left, paint }
+    }
+
+    /// The same with another alignment.
+    #[must_use]
+    pub fn align(self, align: Align) -> Self {
+        Self { align, ..self }
+    }
+
+    /// The same in bold.
+    #[must_use]
+    pub fn bold(self) -> Self {
+        Self { bold: true, ..self }
+    }
+}
+
+impl Fonts {
+    /// Loads the faces.
+    ///
+    /// # Errors
+    /// [`Error::Font`].
+    pub fn load() -> Result<Self, Error> {
+        Ok(Self {
+            regular: FontRef::try_from_slice(dejavu::sans::regular())?,
+            bold: FontRef::try_from_slice(dejavu::sans::bold())?,
+        })
+    }
+
+    fn face(&self, style: &Style) -> &FontRef<'static> {
+        if style.bold { &self.bold } else { &self.regular }
+    }
+
+    /// Width of a text in pixels.
+    #[must_use]
+    pub fn width(&self, text: &str, style: &Style) -> f64 {
+        let face = self.face(style).as_scaled(PxScale::from(style.size as f32));
+        let (mut width, mut last) = (0.0, None);
+        for character in text.chars() {
+            let glyph = face.glyph_id(character);
+            width += last.map_or(0.0, |last| face.kern(last, glyph)) + face.h_advance(glyph);
+            last = Some(glyph);
+        }
+        f64::from(width)
+    }
+
+    /// Writes a text with its base line at a position.
+    pub fn write(&self, canvas: &mut Canvas, text: &str, [x, y]: [f64; 2], style: &Style) {
+        let x = match style.align {
+            Align::Left => x,
+            Align::Centre => x - self.width(text, style) / 2.0,
+            Align::Right => x - self.width(text, style),
+        };
+        let scale = PxScale::from(style.size as f32);
+        let face = self.face(style).as_scaled(scale);
+        let (mut place, mut last) = (x as f32, None);
+        for character in text.chars() {
+            let glyph = face.glyph_id(character);
+            place += last.map_or(0.0, |last| face.kern(last, glyph));
+            let placed = glyph.with_scale_and_position(scale, point(place, y as f32));
+            if let Some(outline) = face.outline_glyph(placed) {
+                let corner = outline.px_bounds().min;
+                outline.draw(|column, row, cover| {
+                    let x = i64::from(column) + corner.x as i64;
+                    let y = i64::from(row) + corner.y as i64;
+                    canvas.blend(x, y, style.paint, f64::from(cover));
+                });
+            }
+            place += face.h_advance(glyph);
+            last = Some(glyph);
+        }
+    }
+
+    /// Writes a text with a light rim, readable on any ground.
+    pub fn write_on_map(&self, canvas: &mut Canvas, text: &str, [x, y]: [f64; 2], style: &Style) {
+        let rim = Style { paint: Paint::sheer(crate::colour::PAPER, 0.5), ..*style };
+        let step = (style.size / 14.0).max(1.0);
+        for (dx, dy) in [(-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)] {
+            let place = [x + f64::from(dx) * step, y + f64::from(dy) * step];
+            self.write(canvas, text, place, &rim);
+        }
+        self.write(canvas, text, [x, y], style);
+    }
+}
+
+/// A whole number with its digits in groups of three.
+#[must_use]
+pub fn grouped(value: i64) -> String {
+    let digits = value.unsigned_abs().to_string();
+    let mut text = String::new();
+    for (place, digit) in digits.chars().enumerate() {
+        if place > 0 && (digits.len() - place).is_multiple_of(3) {
+            text.push('\u{202F}');
+        }
+        text.push(digit);
+    }
+    if value < 0 { format!("-{text}") } else { text }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_stands_where_it_should() {
+        let fonts = Fonts::load().unwrap();
+        let style = Style::new(20.0, Paint::solid([0; 3]));
+        let width = fonts.width("Height [m²]", &style);
+        assert!(width > 60.0 && width < 130.0, "{width}");
+        let mut canvas = Canvas::new(200, 40, [255; 3]);
+        fonts.write(&mut canvas, "Height [m²]", [190.0, 30.0], &style.align(Align::Right));
+        let dark = |x: i64| (0..40).any(|y| canvas.pixel(x, y).unwrap()[0] < 100);
+        assert!(dark(188) || dark(187) || dark(186));
+        assert!((0..60).all(|x| !dark(x)) && (191..200).all(|x| !dark(x)));
+    }
+
+    #[test]
+    fn digits_are_grouped() {
+        let text = |value| grouped(value).replace('\u{202F}', " ");
+        assert_eq!(
+            [text(0), text(999), text(3_813_056), text(-1000)],
+            ["0", "999", "3 813 056", "-1 000"]
+        );
+    }
+}
