@@ -27,6 +27,8 @@ pub enum Symbol {
     Cross(Rgb),
     /// A filled square.
     Swatch(Rgb),
+    /// A filled square with a light ring: a crown outline on a canopy.
+    Crown(Rgb),
 }
 
 /// One part of the legend.
@@ -343,6 +345,10 @@ pub fn draw_symbol(canvas: &mut Canvas, symbol: Symbol, [x, y]: [f64; 2], radius
             let r = radius * 0.75;
             canvas.line(&[[x - r, y - r], [x + r, y + r]], stroke, Paint::solid(colour));
             canvas.line(&[[x - r, y + r], [x + r, y - r]], stroke, Paint::solid(colour));
+        }
+        Symbol::Crown(colour) => {
+            draw_symbol(canvas, Symbol::Swatch(colour), [x, y], radius);
+            draw_symbol(canvas, Symbol::Ring(PAPER), [x, y], radius * 0.72);
         }
         Symbol::Swatch(colour) => {
             canvas.rect([x - radius, y - radius], [x + radius, y + radius], Paint::solid(colour));

@@ -53,8 +53,15 @@ impl Grid {
     /// that holds the position has none.
     #[must_use]
     pub fn sample(&self, at: [f64; 2]) -> Option<f64> {
+        self.sample_like(at, f64::INFINITY)
+    }
+
+    /// As [`Grid::sample`], among the cells whose values are within `tolerance` of that of the cell
+    /// that holds the position: edges stay sharp.
+    #[must_use]
+    pub fn sample_like(&self, at: [f64; 2], tolerance: f64) -> Option<f64> {
         let [column, row] = self.cell_at(at);
-        self.get(column, row)?;
+        let own = self.get(column, row)?;
         let (u, v) = (at[0] / self.cell_m - 0.5, at[1] / self.cell_m - 0.5);
         let (left, low) = (u.floor(), v.floor());
         let (mut sum, mut weights) = (0.0, 0.0);
@@ -62,7 +69,8 @@ impl Grid {
             let weight = |place: f64, first: f64, step: i64| {
                 if step == 0 { 1.0 - (place - first) } else { place - first }
             };
-            if let Some(value) = self.get(left as i64 + dc, low as i64 + dr) {
+            let value = self.get(left as i64 + dc, low as i64 + dr);
+            if let Some(value) = value.filter(|value| (value - own).abs() <= tolerance) {
                 let share = weight(u, left, dc) * weight(v, low, dr);
                 sum += share * value;
                 weights += share;
@@ -115,6 +123,7 @@ mod tests {
         let grid = Grid { cell_m: 2.0, window, values: vec![1.0, 3.0, f32::NAN] };
         assert_eq!(grid.sample([2.0, 1.0]), Some(2.0));
         assert_eq!(grid.sample([3.9, 1.0]), Some(3.0));
+        assert_eq!(grid.sample_like([2.0, 1.0], 1.0), Some(3.0));
         assert_eq!([grid.sample([4.1, 1.0]), grid.sample([-0.1, 1.0])], [None, None]);
     }
 

@@ -30,6 +30,22 @@ pub fn hillshade(surface: &Grid, exaggeration: f64) -> Vec<f32> {
     light
 }
 
+/// By how much heights are best multiplied: so that slopes that only a tenth of the cells exceed are
+/// drawn as 40 %, at least once and at most five times.
+#[must_use]
+pub fn exaggeration(surface: &Grid) -> f64 {
+    const DRAWN_SLOPE: f64 = 0.4;
+    let window = surface.window;
+    let cells = (window.row0..window.end_row())
+        .flat_map(|row| (window.column0..window.end_column()).map(move |column| (column, row)));
+    let slopes = cells.filter_map(|(column, row)| slopes(surface, column, row));
+    let steepness = slopes.map(|[east, north]| (east * east + north * north).sqrt() as f32);
+    match crate::grid::range(steepness, 0.1) {
+        Some([_, steep]) if steep > 0.0 => (DRAWN_SLOPE / steep).clamp(1.0, 5.0),
+        _ => 1.0,
+    }
+}
+
 /// Rise to the east and to the north, metres a metre.
 fn slopes(surface: &Grid, column: i64, row: i64) -> Option<[f64; 2]> {
     let own = surface.get(column, row)?;
@@ -81,6 +97,13 @@ mod tests {
     fn slopes_of_a_plane() {
         let [east, north] = slopes(&plane(0.3, -0.2), 0, 9).unwrap();
         assert!((east - 0.3).abs() < 1e-6 && (north + 0.2).abs() < 1e-6);
+    }
+
+    #[test]
+    fn gentle_terrain_is_exaggerated() {
+        let found = [0.0, 0.01, 0.2, 0.9].map(|slope| exaggeration(&plane(slope, 0.0)));
+        assert_eq!([found[0], found[1], found[3]], [1.0, 5.0, 1.0]);
+        assert!((found[2] - 2.0).abs() < 1e-5);
     }
 
     #[test]

@@ -3,7 +3,7 @@
 use crate::canvas::{Canvas, Paint};
 use crate::colour::{INK, NO_DATA, PAPER, Rgb, VIRIDIS, lit, mix};
 use crate::figure::{Entry, Figure, Page, Symbol, draw_symbol};
-use crate::hillshade::hillshade;
+use crate::hillshade::{exaggeration, hillshade};
 use crate::{Error, Grid};
 use timberline_artefact::Crs;
 use timberline_pointcloud::Rect;
@@ -12,6 +12,8 @@ use timberline_pointcloud::Rect;
 const COVER_M: [f64; 2] = [0.5, 2.0];
 /// Share of canopy cells left out at the upper end of the ramp (single high returns).
 const LEFT_OUT: f64 = 0.002;
+/// Neighbouring cells of the canopy are smoothed when their heights differ by less, metres.
+const SAME_CROWN_M: f64 = 3.0;
 /// Light on level ground is brought to this.
 const LEVEL_LIGHT: f64 = 0.88;
 /// Crowns narrower than this many pixels have no outline.
@@ -52,30 +54,34 @@ pub struct MapContents<'a> {
 pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
     let MapContents { extent, terrain, canopy, .. } = contents;
     let top = canopy.range(LEFT_OUT).map_or(1.0, |[_, high]| high.max(1.0));
+    let steepening = exaggeration(terrain);
     let mut figure = Figure::new(Page {
         title: contents.title,
         subtitle: contents.subtitle,
         extent: extent.grown(extent.size()[0].max(extent.size()[1]) * 0.01),
         detail_m: canopy.cell_m,
         crs: contents.crs,
-        legend: legend(top, !contents.trees.is_empty()),
+        legend: legend(top, !contents.trees.is_empty(), steepening),
     })?;
-    let light = Light { terrain: relief(terrain), canopy: relief(canopy) };
+    let light = Light { terrain: relief(terrain, steepening), canopy: relief(canopy, 1.0) };
     figure.paint(|at| pixel(at, canopy, &light, top));
     draw_crowns(&mut figure, contents.trees);
     draw_tops(&mut figure, contents.trees);
     Ok(figure.finish())
 }
 
-fn legend(top: f64, has_trees: bool) -> Vec<Entry> {
+fn legend(top: f64, has_trees: bool, steepening: f64) -> Vec<Entry> {
     let title = "Canopy height [m]".to_owned();
     let mut entries = vec![Entry::Ramp { title, ramp: VIRIDIS, range: [0.0, top] }];
     if has_trees {
         entries.push(Entry::Symbol(Symbol::Dot(PAPER), "treetop".to_owned()));
-        entries.push(Entry::Symbol(Symbol::Ring(INK), "crown outline".to_owned()));
+        entries.push(Entry::Symbol(Symbol::Crown(VIRIDIS.at(0.55)), "crown outline".to_owned()));
     }
     entries.push(Entry::Symbol(Symbol::Swatch(ground_colour(0.5)), "ground, shaded".to_owned()));
     entries.push(Entry::Symbol(Symbol::Swatch(NO_DATA), "no data".to_owned()));
+    if steepening > 1.05 {
+        entries.push(Entry::Note(format!("relief steepened {steepening:.1} times")));
+    }
     entries
 }
 
@@ -85,8 +91,8 @@ struct Light {
     canopy: Grid,
 }
 
-fn relief(surface: &Grid) -> Grid {
-    Grid { values: hillshade(surface, 1.0), cell_m: surface.cell_m, window: surface.window }
+fn relief(surface: &Grid, steepening: f64) -> Grid {
+    Grid { values: hillshade(surface, steepening), cell_m: surface.cell_m, window: surface.window }
 }
 
 /// The colour of ground in a light from 0 to 1.
@@ -97,7 +103,7 @@ fn ground_colour(light: f64) -> Rgb {
 fn pixel(at: [f64; 2], canopy: &Grid, light: &Light, top: f64) -> Rgb {
     let terrain_light = light.terrain.sample(at);
     let ground = terrain_light.map_or(NO_DATA, ground_colour);
-    let Some(height) = canopy.sample(at) else { return ground };
+    let Some(height) = canopy.sample_like(at, SAME_CROWN_M) else { return ground };
     let crown_light = light.canopy.sample(at).unwrap_or(0.5);
     // A crown stands in the light of the slope and in that of its own surface.
     let shade = 0.55 + 0.5 * terrain_light.unwrap_or(0.5) + 0.4 * (crown_light - 0.5);
