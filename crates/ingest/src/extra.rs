@@ -11,6 +11,8 @@ use std::collections::BTreeSet;
 use timberline_pointcloud::Column;
 
 const DESCRIPTION_LEN: usize = 192;
+/// More attributes than any file has: a damaged header may promise 65,000 bytes a point.
+const MAX_FIELDS: usize = 256;
 /// Columns of other origin; an attribute of the same name gets a number.
 const TAKEN: [&str; 6] = ["red", "green", "blue", "nir", "user_data", "scanner_channel"];
 
@@ -86,7 +88,7 @@ pub fn fields(
     notes: &mut Notes,
 ) -> Vec<ExtraField> {
     let names: BTreeSet<String> = TAKEN.iter().map(|name| (*name).to_owned()).collect();
-    let mut layout = Fields { at: from, to, fields: Vec::new(), names };
+    let mut layout = Fields { at: from, to, fields: Vec::new(), names, left_out: 0 };
     'records: for record in records {
         if !record.bytes.len().is_multiple_of(DESCRIPTION_LEN) {
             notes.say(format!(
@@ -107,6 +109,12 @@ pub fn fields(
         }
     }
     layout.undocumented();
+    if layout.left_out > 0 {
+        notes.say(format!(
+            "{} extra bytes a point beyond the first {MAX_FIELDS} attributes are left out",
+            layout.left_out
+        ));
+    }
     layout.fields
 }
 
@@ -158,6 +166,7 @@ struct Fields {
     to: usize,
     fields: Vec<ExtraField>,
     names: BTreeSet<String>,
+    left_out: usize,
 }
 
 impl Fields {
@@ -191,6 +200,11 @@ impl Fields {
     }
 
     fn push(&mut self, base: &str, stored: Stored, from: &Described, part: usize, numbered: bool) {
+        if self.fields.len() == MAX_FIELDS {
+            self.left_out += stored.len();
+            self.at += stored.len();
+            return;
+        }
         let name = self.free_name(base, numbered || base == "extra_bytes");
         let described = from.code != 0;
         let (has_scale, has_offset) =
@@ -353,6 +367,14 @@ mod tests {
         let (found, notes) = check(bytes[..300].to_vec(), 2);
         assert_eq!(names(&found), ["extra_bytes_1", "extra_bytes_2"]);
         assert!(notes[0].contains("no multiple of 192") && notes[1].contains("data type 99"));
+    }
+
+    /// Found by fuzzing: naming twelve thousand columns took minutes.
+    #[test]
+    fn records_of_thousands_of_bytes_are_cut() {
+        let (found, notes) = check(Vec::new(), 60_000);
+        assert_eq!(found.len(), MAX_FIELDS);
+        assert!(notes[0].contains("59744 extra bytes"), "{notes:?}");
     }
 
     #[test]

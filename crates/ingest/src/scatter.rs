@@ -182,10 +182,10 @@ impl<W: Write> Buckets<W> {
         let mut run: (Option<TileId>, Vec<u32>) = (None, Vec::new());
         for index in 0..batch.len() {
             let tile = self.grid.tile_at(batch.x[index], batch.y[index]);
-            if run.0 != Some(tile) {
-                if let Some(before) = run.0.replace(tile) {
-                    by_tile.entry(before).or_default().append(&mut run.1);
-                }
+            if run.0 != Some(tile)
+                && let Some(before) = run.0.replace(tile)
+            {
+                by_tile.entry(before).or_default().append(&mut run.1);
             }
             run.1.push(index as u32);
         }

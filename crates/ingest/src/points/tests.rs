@@ -115,6 +115,21 @@ fn a_damaged_chunk_costs_its_own_points_only() {
 }
 
 #[test]
+fn extra_bytes_nobody_describes_are_kept_by_number() {
+    let build = |format: u8, version: (u8, u8)| {
+        let las = LasBytes::new(version, format).extra_len(2);
+        let mut record = las.record([1, 2, 3]);
+        let at = record.len() - 2;
+        record[at..].copy_from_slice(&[5, 9]);
+        las.push(record).build_laz(10)
+    };
+    for bytes in [build(1, (1, 2)), build(7, (1, 4))] {
+        let cloud = open(bytes).unwrap().next_batch().unwrap().unwrap();
+        assert_eq!(cloud.extra["extra_bytes_2"].value(0), 9.0);
+    }
+}
+
+#[test]
 fn items_must_make_up_the_record() {
     let mut bytes = las((1, 2), 1, 10).build_laz(64);
     bytes[105..107].copy_from_slice(&40u16.to_le_bytes());
