@@ -1,0 +1,119 @@
+//! The stage on a row of crowns across tiles: the same labels however the row is cut.
+
+use std::collections::BTreeMap;
+use timberline_artefact::alone::Alone;
+use timberline_artefact::kinds::*;
+use timberline_artefact::stage::{Campaign, Stage};
+use timberline_artefact::{Facts, Kind, UnitId, read, tree_id};
+use timberline_pointcloud::frame::{quantise, ticks_from_world};
+use timberline_pointcloud::{Point, PointCloud, TileGrid};
+use timberline_segmentation::SegmentationParams;
+use timberline_segmentation::stage::SegmentationStage;
+
+const CORNER: [f64; 3] = [500_000.0, 4_200_000.0, 80.0];
+
+/// Echoes on a lattice of 0.7 m in the plane and 1.3 m in height.
+fn points() -> Vec<[f64; 3]> {
+    let mut points = Vec::new();
+    for i in 0..90 {
+        for j in 0..30 {
+            for k in 0..12 {
+                let local = [0.7 * f64::from(i), 0.7 * f64::from(j), 1.3 * f64::from(k)];
+                points.push([0, 1, 2].map(|axis| quantise(CORNER[axis] + local[axis])));
+            }
+        }
+    }
+    points
+}
+
+/// Crowns of several sizes and shapes in a row that crosses tiles; every fifth is rejected.
+fn models() -> Vec<CrownModel> {
+    let model = |i: u32| {
+        let apex = [4.3 * f64::from(i) + 2.1, 9.0 + f64::from(i % 3), 13.0 + f64::from(i % 4)];
+        let apex_m = [0, 1, 2].map(|axis| quantise(CORNER[axis] + apex[axis]));
+        let (shape, parameters) = match i % 4 {
+            0 => (CrownShape::Mixed, [0.8, 0.3]),
+            1 => (CrownShape::Cone, [0.25, 0.0]),
+            2 => (CrownShape::Paraboloid, [-0.5, 0.0]),
+            _ => (CrownShape::Blend, [0.3, 0.0]),
+        };
+        CrownModel {
+            id: tree_id(apex_m[0], apex_m[1]),
+            apex_m,
+            height_m: apex[2],
+            shape,
+            parameters,
+            radius_m: 2.5 + 0.5 * f64::from(i % 5),
+            tolerance_m: 0.6,
+            status: if i % 5 == 4 { CrownStatus::TooManyOutliers } else { CrownStatus::Accepted },
+            ..CrownModel::default()
+        }
+    };
+    (0..14).map(model).collect()
+}
+
+/// Tree and score of every point by its position, over all tiles.
+fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Alone::new(folder.path(), Campaign { grid: Some(grid), ..Campaign::default() });
+    let (points, models) = (points(), models());
+    let mut tiles: Vec<_> = points.iter().map(|p| grid.tile_at(p[0], p[1])).collect();
+    tiles.sort();
+    tiles.dedup();
+    let mut clouds = Vec::new();
+    for &tile in &tiles {
+        let frame = PointTile::frame(&grid, tile, CORNER[2]);
+        let mut cloud = PointCloud::new(frame);
+        let here = |p: &&[f64; 3]| grid.tile_at(p[0], p[1]) == tile;
+        points.iter().filter(here).for_each(|p| cloud.push_world(*p, &Point::default()));
+        let cloud = cloud.in_canonical_order();
+        let height_m = (0..cloud.len()).map(|i| (cloud.world(i)[2] - CORNER[2]) as f32).collect();
+        let here = |m: &&CrownModel| grid.tile_at(m.apex_m[0], m.apex_m[1]) == tile;
+        let mut models: Vec<CrownModel> = models.iter().filter(here).cloned().collect();
+        models.sort_by_key(|model| model.id);
+        let facts = Facts { frame: Some(frame), grid: Some(grid), ..Facts::default() };
+        let counted = facts.clone().count("points", cloud.len());
+        clouds.push(cloud.clone());
+        store.put(UnitId::Tile(tile), &PointTile { cloud }, counted).unwrap();
+        store.put(UnitId::Tile(tile), &Heights { height_m }, facts.clone()).unwrap();
+        store.put(UnitId::Tile(tile), &CrownModels { models }, facts).unwrap();
+    }
+    let mut labelled = BTreeMap::new();
+    for (tile, cloud) in tiles.into_iter().zip(clouds) {
+        let params = SegmentationParams::default();
+        let path = store.run::<SegmentationStage>(UnitId::Tile(tile), None, &params).unwrap();
+        let (_, Labels { tree_id, score }) = read::<Labels>(&path).unwrap();
+        assert_eq!((tree_id.len(), score.len()), (cloud.len(), cloud.len()));
+        for i in 0..cloud.len() {
+            labelled.insert(cloud.world(i).map(ticks_from_world), (tree_id[i], score[i].to_bits()));
+        }
+    }
+    labelled
+}
+
+#[test]
+fn labels_do_not_depend_on_the_tiles() {
+    let whole = run(TileGrid::new(128, [0, 0]).unwrap());
+    assert_eq!(whole.len(), 90 * 30 * 12);
+    for (edge, origin) in [(16, [0, 0]), (32, [5, 9]), (64, [32, 0])] {
+        assert!(run(TileGrid::new(edge, origin).unwrap()) == whole, "tiles of {edge} m");
+    }
+}
+
+#[test]
+fn accepted_crowns_have_points_and_rejected_none() {
+    let labelled = run(TileGrid::new(64, [0, 0]).unwrap());
+    let count = |id: u64| labelled.values().filter(|(tree, _)| *tree == id).count();
+    for model in models() {
+        let stands = model.status == CrownStatus::Accepted;
+        assert_eq!(count(model.id) > 20, stands, "{model:?}");
+    }
+    assert!(count(0) > 1000);
+    assert!(labelled.iter().all(|(p, (tree, _))| *tree == 0 || p[2] > ticks_from_world(81.0)));
+}
+
+#[test]
+fn names_and_kinds() {
+    assert_eq!(SegmentationStage::info().outputs, [Labels::NAME]);
+    assert_eq!(SegmentationStage::halo_m(&SegmentationParams::default()), 15.0);
+}
