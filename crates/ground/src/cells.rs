@@ -40,8 +40,11 @@ pub fn without_pits(points: &[[f64; 3]], mut low: Vec<usize>) -> Vec<usize> {
             .into_iter()
             .map(|i| (key(points[i], PIT_CELL_M), i))
             .collect();
-        let mut pits: Vec<usize> =
-            lowest.iter().filter(|(k, i)| is_pit(points, &lowest, **k, **i)).map(|(_, i)| *i).collect();
+        let mut pits: Vec<usize> = lowest
+            .iter()
+            .filter(|(k, i)| is_pit(points, &lowest, **k, **i))
+            .map(|(_, i)| *i)
+            .collect();
         if pits.is_empty() {
             break;
         }
@@ -71,7 +74,9 @@ mod tests {
     use super::*;
 
     fn slope(gradient: f64) -> Vec<[f64; 3]> {
-        (0..1600).map(|i| [f64::from(i % 40), f64::from(i / 40), gradient * f64::from(i % 40)]).collect()
+        (0..1600)
+            .map(|i| [f64::from(i % 40), f64::from(i / 40), gradient * f64::from(i % 40)])
+            .collect()
     }
 
     #[test]

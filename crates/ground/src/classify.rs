@@ -38,7 +38,11 @@ const COVERAGE_SHARE: f64 = 0.5;
 ///
 /// # Errors
 /// [`Error::Triangulation`]; [`Error::Parameter`] for blocks of no size.
-pub fn classify(cloud: &PointCloud, rect: Rect, params: &GroundParams) -> Result<Vec<Label>, Error> {
+pub fn classify(
+    cloud: &PointCloud,
+    rect: Rect,
+    params: &GroundParams,
+) -> Result<Vec<Label>, Error> {
     let grid = Grid2::new(&cloud.x, &cloud.y, params.buffer_m.max(4.0))?;
     let blocks = blocks_over(rect, params.block_m);
     let found: Result<Vec<Vec<(usize, Label)>>, Error> = blocks
@@ -111,7 +115,11 @@ impl Block {
         Self { indices, positions, own, edge_m }
     }
 
-    fn label(&self, cloud: &PointCloud, params: &GroundParams) -> Result<Vec<(usize, Label)>, Error> {
+    fn label(
+        &self,
+        cloud: &PointCloud,
+        params: &GroundParams,
+    ) -> Result<Vec<(usize, Label)>, Error> {
         let supplied = match params.source {
             Source::Use => true,
             Source::Classify => false,

@@ -23,10 +23,19 @@ use crate::tin::Tin;
 
 /// Steps at every level.
 const STEPS: usize = 3;
+/// Steps at the last level.
+const LAST_STEPS: usize = 4;
 /// Rounds of the final trim; each takes at most the highest vertex of a neighbourhood.
 const TRIM_ROUNDS: usize = 8;
-/// Edge of the cells of which only the lowest point can be a vertex, metres; the finest level.
+/// Cell of the last level, metres: a step takes at most one point from each.
+const FINEST_LEVEL_M: f64 = 0.5;
+/// Edge of the cells of which only the lowest point can be a vertex, metres.
 pub const FINEST_M: f64 = 0.5;
+/// Down to this cell a step triangulates anew after taking vertices back; below, where taking back is
+/// local and triangulating costs most, it does both with one triangulation, metres.
+const SHARED_M: f64 = 1.5;
+/// A level ends when a step adds less than one vertex in so many.
+const FEW: usize = 1000;
 /// A vertex taken back this often stays out.
 const LAST_REMOVAL: u8 = 3;
 /// Below this distance from the plane the angle, unreliable there, does not count, metres.
@@ -43,22 +52,28 @@ const LEAST_PIT_M: f64 = 1.0;
 ///
 /// # Errors
 /// [`Error::Triangulation`].
-pub fn densify(points: &[[f64; 3]], edge_m: f64, params: &GroundParams) -> Result<Vec<usize>, Error> {
+pub fn densify(
+    points: &[[f64; 3]],
+    edge_m: f64,
+    params: &GroundParams,
+) -> Result<Vec<usize>, Error> {
     let all: Vec<usize> = (0..points.len()).collect();
     let low = without_pits(points, lowest_per_cell(points, &all, FINEST_M));
     let mut ground = Ground::new(points, low, edge_m, params.seed_cell_m);
     if ground.vertices.is_empty() {
         return Ok(Vec::new());
     }
+    let spike = libm::tan(params.spike_deg.to_radians());
     for level in levels(params) {
-        for _ in 0..STEPS {
-            ground.take_back(params.spike_deg, level.cell_m < params.seed_cell_m)?;
-            if !ground.take_in(&level)? {
+        let steps = if level.cell_m > FINEST_LEVEL_M { STEPS } else { LAST_STEPS };
+        for _ in 0..steps {
+            if !ground.step(&level, spike)? {
                 break;
             }
         }
     }
-    ground.take_back(params.spike_deg, true)?;
+    let tin = ground.tin()?;
+    ground.take_back(&tin, FINEST_LEVEL_M, spike);
     for _ in 0..TRIM_ROUNDS {
         if !ground.trim(params)? {
             break;
@@ -75,17 +90,18 @@ struct Level {
     sine: f64,
 }
 
-/// Cells halve from the seeds' to [`FINEST_M`]; distances shrink geometrically, angles linearly.
+/// Cells halve from the seeds' to [`FINEST_LEVEL_M`]; distances shrink geometrically, angles linearly.
 fn levels(params: &GroundParams) -> Vec<Level> {
     let mut cells = vec![params.seed_cell_m];
-    while cells[cells.len() - 1] > FINEST_M {
-        cells.push((cells[cells.len() - 1] / 2.0).max(FINEST_M));
+    while cells[cells.len() - 1] > FINEST_LEVEL_M {
+        cells.push((cells[cells.len() - 1] / 2.0).max(FINEST_LEVEL_M));
     }
     let last = (cells.len() - 1).max(1) as f64;
     let level = |(i, cell_m): (usize, f64)| {
         let t = i as f64 / last;
         let ratio = params.fine_distance_m / params.coarse_distance_m;
-        let degrees = params.coarse_angle_deg + t * (params.fine_angle_deg - params.coarse_angle_deg);
+        let degrees =
+            params.coarse_angle_deg + t * (params.fine_angle_deg - params.coarse_angle_deg);
         Level {
             cell_m,
             distance_m: params.coarse_distance_m * libm::pow(ratio, t),
@@ -99,6 +115,7 @@ fn levels(params: &GroundParams) -> Vec<Level> {
 struct Ground<'a> {
     points: &'a [[f64; 3]],
     edge_m: f64,
+    seed_cell_m: f64,
     /// Points that may become vertices.
     low: Vec<usize>,
     /// Those that are, ascending.
@@ -113,7 +130,7 @@ impl<'a> Ground<'a> {
         let mut is_vertex = vec![false; points.len()];
         vertices.iter().for_each(|&i| is_vertex[i] = true);
         let removals = vec![0; points.len()];
-        Self { points, edge_m, low, vertices, is_vertex, removals }
+        Self { points, edge_m, seed_cell_m, low, vertices, is_vertex, removals }
     }
 
     /// Triangulates the vertices and a rim around the block that continues their slope.
@@ -123,45 +140,54 @@ impl<'a> Ground<'a> {
         Tin::new(&positions)
     }
 
-    /// Takes in the lowest acceptable point of every cell; `false` when there was none.
-    fn take_in(&mut self, level: &Level) -> Result<bool, Error> {
-        let tin = self.tin()?;
-        let mut cursor = tin.cursor();
-        let mut acceptable = Vec::new();
-        for &i in &self.low {
-            if self.is_vertex[i] || self.removals[i] >= LAST_REMOVAL {
-                continue;
-            }
-            let Some(offset) = cursor.offset(self.points[i]) else { continue };
-            let near = offset.normal_m < level.distance_m && offset.normal_m > -3.0 * level.distance_m;
-            if near && (offset.sine < level.sine || offset.normal_m.abs() < FLAT_M) {
-                acceptable.push(i);
-            }
+    /// One step: takes back what sticks out, takes in the lowest acceptable point of every cell.
+    /// `false` when hardly anything was taken in.
+    fn step(&mut self, level: &Level, spike: f64) -> Result<bool, Error> {
+        let mut tin = self.tin()?;
+        let removed = self.take_back(&tin, level.cell_m, spike);
+        if removed && level.cell_m > SHARED_M {
+            tin = self.tin()?;
         }
+        let acceptable = self.acceptable(&tin, level);
         let taken = lowest_per_cell(self.points, &acceptable, level.cell_m);
         taken.iter().for_each(|&i| self.is_vertex[i] = true);
         self.vertices.extend(&taken);
         self.vertices.sort_unstable();
-        Ok(!taken.is_empty())
+        Ok(taken.len() > self.vertices.len() / FEW)
     }
 
-    /// Takes back vertices that stick out of their neighbours' plane by more than the slope
-    /// `spike_deg` over the distance of the neighbours, up or down.
-    fn take_back(&mut self, spike_deg: f64, pits: bool) -> Result<(), Error> {
-        let tangent = libm::tan(spike_deg.to_radians());
-        let tin = self.tin()?;
+    /// Points close enough to their triangle by distance and angle.
+    fn acceptable(&self, tin: &Tin, level: &Level) -> Vec<usize> {
+        let mut cursor = tin.cursor();
+        let mut accept = |i: usize| {
+            let Some(offset) = cursor.offset(self.points[i]) else { return false };
+            let distance = offset.normal_m;
+            let near = distance < level.distance_m && distance > -3.0 * level.distance_m;
+            near && (offset.sine < level.sine || distance.abs() < FLAT_M)
+        };
+        let open = |i: &usize| !self.is_vertex[*i] && self.removals[*i] < LAST_REMOVAL;
+        self.low.iter().copied().filter(open).filter(|&i| accept(i)).collect()
+    }
+
+    /// Takes back vertices that stick out of their neighbours' plane by more than the slope `spike`
+    /// over the distance of the neighbours; by twice that, those below it. Whether there were any.
+    fn take_back(&mut self, tin: &Tin, cell_m: f64, spike: f64) -> bool {
+        if cell_m >= self.seed_cell_m {
+            return false;
+        }
+        let before = self.vertices.len();
         for (place, &i) in self.vertices.iter().enumerate() {
             let (deviation, distance) = tin.deviation(place);
-            if deviation > LEAST_SPIKE_M.max(tangent * distance) {
+            if deviation > LEAST_SPIKE_M.max(spike * distance) {
                 self.removals[i] += 1;
                 self.is_vertex[i] = false;
-            } else if pits && -deviation > LEAST_PIT_M.max(2.0 * tangent * distance) {
+            } else if -deviation > LEAST_PIT_M.max(2.0 * spike * distance) {
                 self.removals[i] = LAST_REMOVAL;
                 self.is_vertex[i] = false;
             }
         }
         self.keep_vertices();
-        Ok(())
+        self.vertices.len() < before
     }
 
     /// Takes back vertices that stand above their neighbours by a hand, the highest of each

@@ -25,7 +25,12 @@ pub(crate) fn rim(vertices: &[[f64; 3]], edge_m: f64) -> Result<Vec<[f64; 3]>, E
     let mut places = Vec::with_capacity(4 * steps);
     for i in 0..steps {
         let along = low + i as f64 * step;
-        places.extend([[along, low], [high, along], [low + high - along, high], [low, low + high - along]]);
+        places.extend([
+            [along, low],
+            [high, along],
+            [low + high - along, high],
+            [low, low + high - along],
+        ]);
     }
     let elevation = |place: &[f64; 2]| {
         let near = tree.nearest(place, SUPPORT);
@@ -61,8 +66,9 @@ mod tests {
 
     #[test]
     fn a_slope_goes_on() {
-        let vertices: Vec<[f64; 3]> =
-            (0..64).map(|i| [f64::from(i % 8) * 12.0, f64::from(i / 8) * 12.0, f64::from(i % 8) * 12.0]).collect();
+        let vertices: Vec<[f64; 3]> = (0..64)
+            .map(|i| [f64::from(i % 8) * 12.0, f64::from(i / 8) * 12.0, f64::from(i % 8) * 12.0])
+            .collect();
         for [x, y, z] in rim(&vertices, 90.0).unwrap() {
             assert!((z - x).abs() < 6.0, "{z} at {x} {y}");
         }

@@ -49,7 +49,8 @@ impl Tin {
         if triangulation.num_vertices() == vertices.len() {
             return Ok(Self { triangulation });
         }
-        let reason = format!("{} of {} vertices are distinct", triangulation.num_vertices(), vertices.len());
+        let reason =
+            format!("{} of {} vertices are distinct", triangulation.num_vertices(), vertices.len());
         Err(Error::Triangulation { reason })
     }
 
@@ -125,8 +126,7 @@ impl Cursor<'_> {
 fn offset_to(corners: [[f64; 3]; 3], p: [f64; 3]) -> Offset {
     let minus = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let (u, v) = (minus(corners[1], corners[0]), minus(corners[2], corners[0]));
-    let normal =
-        [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+    let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
     let w = minus(p, corners[0]);
     let along = w[0] * normal[0] + w[1] * normal[1] + w[2] * normal[2];
     let length = (normal[0] * normal[0] + normal[1] * normal[1] + normal[2] * normal[2]).sqrt();
