@@ -2,6 +2,7 @@
 
 pub mod cells;
 pub mod classify;
+pub mod coverage;
 pub mod dense;
 pub mod error;
 pub mod hardy;
@@ -13,6 +14,7 @@ mod projection;
 pub mod ptd;
 pub mod quadtree;
 mod rim;
+pub mod stage;
 pub mod surface;
 pub mod tin;
 pub mod tuning;

@@ -93,22 +93,47 @@ impl Default for GroundParams {
 #[serde(default, deny_unknown_fields)]
 pub struct DtmParams {
     /// How the kernel is set.
+    #[schemars(extend("x-source" = "Rippa 1999"))]
     pub tuning: Tuning,
     /// Kernel offset D where `tuning` is `given`.
+    #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "Hardy 1971"))]
     pub offset_m: f64,
-    /// Smoothing λ where `tuning` is `given`.
+    /// Smoothing λ where `tuning` is `given`; 0 passes through every ground point.
+    #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "Hardy 1971"))]
     pub smoothing_m: f64,
-    /// dev
+    /// Where `tuning` is `auto`: how many points' worth of belief the usual kernel starts with.
+    #[schemars(range(min = 0.0, max = 10_000.0), extend("x-unit" = "points", "x-source" = "measured"))]
     pub prior_weight: f64,
-    /// dev
+    /// Ground points above which a patch is divided into four.
+    #[schemars(range(min = 24, max = 1000), extend("x-unit" = "points", "x-source" = "measured"))]
     pub most_nodes: usize,
-    /// dev
+    /// Edge of the largest patches, as a power of two.
+    #[schemars(range(min = 2, max = 7), extend("x-unit" = "log2 m", "x-source" = "measured"))]
     pub log2_root: i32,
+    /// Ground points closer together than this become one node at their mean.
+    #[schemars(range(min = 0.0, max = 5.0), extend("x-unit" = "m", "x-source" = "measured"))]
+    pub merge_m: f64,
+    /// Edge of the raster's cells.
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "convention"))]
+    pub cell_m: f64,
+    /// How far from the nearest point of any class the raster goes on.
+    #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "convention"))]
+    pub rim_m: f64,
 }
 
 impl Default for DtmParams {
     fn default() -> Self {
-        Self { tuning: Tuning::Auto, offset_m: 0.5, smoothing_m: 0.03, prior_weight: 10.0, most_nodes: 120, log2_root: 4 }
+        Self {
+            tuning: Tuning::Auto,
+            offset_m: 0.5,
+            smoothing_m: 0.03,
+            prior_weight: 10.0,
+            most_nodes: 120,
+            log2_root: 4,
+            merge_m: 0.1,
+            cell_m: 0.5,
+            rim_m: 5.0,
+        }
     }
 }
 
@@ -123,5 +148,13 @@ impl DtmParams {
     #[must_use]
     pub fn gather_m(&self) -> f64 {
         2.0 * crate::nodes::edge_m(self.log2_root)
+    }
+
+    /// How far beyond a rectangle ground points have a say in the surface over it, metres: the
+    /// largest square whose weight reaches in, the squares around it that have a say in its kernel,
+    /// and how far these look for nodes.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        2.0 * crate::nodes::edge_m(self.log2_root) + self.gather_m()
     }
 }

@@ -101,10 +101,9 @@ fn ground_model() -> GroundModel {
     (0..raster.values.len()).for_each(|i| raster.values[i] = i as f64 / 4.0);
     let patch = HardyPatch {
         centre_m: [480.0, -96.0],
-        support_m: 16.0,
-        offset_m: 0.5,
-        smoothing_m: 0.03,
-        z0_m: 3.0,
+        edge_m: 16.0,
+        datum_m: 3.0,
+        offset_squared_m2: 0.25,
         trend: [0.1, 0.2, 0.3],
         nodes_m: vec![[1.0, 2.0], [-3.0, 4.0]],
         coefficients: vec![0.5, -0.5],
