@@ -193,7 +193,8 @@ mod tests {
 
     #[test]
     fn points_in_one_square_become_their_mean() {
-        let nodes = Nodes::new([[0.01, 0.02, 1.0], [0.03, 0.04, 2.0], [0.3, 0.3, 5.0]].into_iter(), 0.1);
+        let nodes =
+            Nodes::new([[0.01, 0.02, 1.0], [0.03, 0.04, 2.0], [0.3, 0.3, 5.0]].into_iter(), 0.1);
         assert_eq!(nodes.len(), 2);
         assert_eq!(nodes.world(0), [0.02, 0.03, 1.5]);
     }

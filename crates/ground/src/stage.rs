@@ -24,10 +24,6 @@ const GROUND_INPUTS: &[InputSpec] = &[InputSpec::halo(PointTile::NAME)];
 const DTM_INPUTS: &[InputSpec] =
     &[InputSpec::halo(PointTile::NAME), InputSpec::halo(GroundPoints::NAME)];
 
-const GROUND_INPUTS: &[InputSpec] = &[InputSpec::halo(PointTile::NAME)];
-const DTM_INPUTS: &[InputSpec] =
-    &[InputSpec::halo(PointTile::NAME), InputSpec::halo(GroundPoints::NAME)];
-
 impl Params for GroundParams {}
 impl Params for DtmParams {}
 

@@ -105,10 +105,8 @@ fn tuned(
     let mut around: Vec<Cell> = roots.iter().flat_map(|root| ring(*root)).collect();
     around.sort_unstable();
     around.dedup();
-    let scored: Result<BTreeMap<Cell, Scores>, Error> = around
-        .par_iter()
-        .map(|root| Ok((*root, scores_of(nodes, *root, division)?)))
-        .collect();
+    let scored: Result<BTreeMap<Cell, Scores>, Error> =
+        around.par_iter().map(|root| Ok((*root, scores_of(nodes, *root, division)?))).collect();
     let scored = scored?;
     let chosen = roots.into_iter().map(|root| {
         let mut pooled = Scores::default();

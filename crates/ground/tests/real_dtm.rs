@@ -45,8 +45,17 @@ fn lab() {
     for root in [4, 5] {
         for nodes in [80usize, 120, 180] {
             for prior in [0.0, 10.0, 40.0, 1e9] {
-                let params = DtmParams { log2_root: root, most_nodes: nodes, prior_weight: prior, ..DtmParams::default() };
-                if env("ROOT", root as f64) != root as f64 || env("NODES", nodes as f64) != nodes as f64 { continue; }
+                let params = DtmParams {
+                    log2_root: root,
+                    most_nodes: nodes,
+                    prior_weight: prior,
+                    ..DtmParams::default()
+                };
+                if env("ROOT", root as f64) != root as f64
+                    || env("NODES", nodes as f64) != nodes as f64
+                {
+                    continue;
+                }
                 let t = std::time::Instant::now();
                 let r: Vec<f64> = scans.iter().map(|s| cross_validated(s, &params)).collect();
                 println!("root {root} nodes {nodes} prior {prior}: {r:.5?} {:.1?}", t.elapsed());

@@ -15,7 +15,8 @@ pub struct Scan {
 impl Scan {
     /// Reads a file of the `als` folder under `TIMBERLINE_DATA`.
     pub fn read(name: &str) -> Self {
-        let root = std::env::var("TIMBERLINE_DATA").expect("TIMBERLINE_DATA names the folder of scans");
+        let root =
+            std::env::var("TIMBERLINE_DATA").expect("TIMBERLINE_DATA names the folder of scans");
         let path = PathBuf::from(root).join("als").join(name);
         let mut reader = las::Reader::from_path(&path).unwrap();
         let points = reader.read_all().unwrap();
@@ -30,7 +31,12 @@ impl Scan {
 
     /// The supplier's ground points.
     pub fn supplier_ground(&self) -> Vec<[f64; 3]> {
-        self.world.iter().zip(&self.class).filter(|(_, class)| **class == 2).map(|(p, _)| *p).collect()
+        self.world
+            .iter()
+            .zip(&self.class)
+            .filter(|(_, class)| **class == 2)
+            .map(|(p, _)| *p)
+            .collect()
     }
 }
 
