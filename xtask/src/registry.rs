@@ -5,7 +5,9 @@ use std::sync::Arc;
 use timberline_artefact::stage::{DynStage, erase};
 use timberline_crowns::stage::{CrownFitStage, CrownModelStage};
 use timberline_export::stage::ExportStage;
+use timberline_ground::stage::{DtmStage, GroundStage};
 use timberline_ingest::stage::{Scatter, Tiles};
+use timberline_report::stage::MapStage;
 use timberline_segmentation::stage::SegmentationStage;
 use timberline_treetops::stage::TreetopsStage;
 
@@ -38,11 +40,14 @@ impl Registry {
         Self::new(vec![
             erase::<Scatter>(),
             erase::<Tiles>(),
+            erase::<GroundStage>(),
+            erase::<DtmStage>(),
             erase::<TreetopsStage>(),
             erase::<CrownModelStage>(),
             erase::<SegmentationStage>(),
             erase::<CrownFitStage>(),
             erase::<ExportStage>(),
+            erase::<MapStage>(),
         ])
     }
 

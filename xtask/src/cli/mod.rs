@@ -132,7 +132,7 @@ impl Program {
             Command::Init(args) => init::run(self, &args),
             Command::Sample(args) => sample::run(&args),
             Command::Export(args) => export::run(&args),
-            Command::Evaluate(args) => evaluate::run(&args),
+            Command::Evaluate(args) => evaluate::run(self, &args),
             Command::Bench(args) => bench::run(&args),
             Command::Completions { shell } => {
                 let mut script = Vec::new();
