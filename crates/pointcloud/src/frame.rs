@@ -19,7 +19,11 @@ pub const MAX_COORDINATE_M: f64 = 67_108_864.0;
 /// The lattice position nearest to a world coordinate, in ticks.
 #[must_use]
 pub fn ticks_from_world(world_m: f64) -> i64 {
-    (world_m * TICKS_PER_M).round() as i64
+    // Half away from zero, as `f64::round`, which without SSE 4.1 is a call into the platform's
+    // library: the largest number below one half is added, then cut (LLVM lowers `round` so).
+    const BELOW_HALF: f64 = 0.499_999_999_999_999_94;
+    let scaled = world_m * TICKS_PER_M;
+    (scaled + BELOW_HALF.copysign(scaled)) as i64
 }
 
 /// The world coordinate of a lattice position: the `f64` nearest to `ticks / 10000`.
@@ -99,6 +103,13 @@ mod tests {
                 frame.local_from_world([p, 0., 0.])[0] - frame.local_from_world([q, 0., 0.])[0]
             };
             prop_assert_eq!(difference(base).to_bits(), difference(base + shift).to_bits());
+        }
+
+        #[test]
+        fn ticks_are_rounded_half_away_from_zero(ticks in -6e11f64..6e11, half in -600_000_000i64..600_000_000) {
+            for world in [ticks / TICKS_PER_M, (half as f64 + 0.5) / TICKS_PER_M, half as f64 / 65_536.0] {
+                prop_assert_eq!(ticks_from_world(world), (world * TICKS_PER_M).round() as i64);
+            }
         }
 
         #[test]
