@@ -71,7 +71,8 @@ impl Observed {
             if !crate::voxels::is_company(cloud.classification[index], cloud.flags[index]) {
                 continue;
             }
-            let cell = [cloud.x[index], cloud.y[index]].map(|v| (v / self.cell_m).floor() as i32);
+            let cell =
+                [cloud.x[index], cloud.y[index]].map(|v| crate::voxels::floor(v / self.cell_m));
             if cell != at.0 {
                 self.add_cell(at.0, at.1);
                 at = (cell, Cell { lowest_m: f64::INFINITY, points: 0 });

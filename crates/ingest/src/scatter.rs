@@ -10,7 +10,7 @@ use crate::{Error, Notes};
 use std::collections::BTreeMap;
 use std::io::Write;
 use timberline_artefact::Crs;
-use timberline_pointcloud::{Bounds3, Column, Frame, PointCloud, TileGrid, TileId};
+use timberline_pointcloud::{Bounds3, Column, Frame, PointCloud, Rect, TileGrid, TileId};
 
 /// Points kept in buffers: some 70 MB. The largest buffers are written when there are more.
 const BUFFERED_POINTS: usize = 1 << 20;
@@ -173,19 +173,22 @@ impl<W: Write> Buckets<W> {
         for (name, column) in &batch.extra {
             let seen =
                 self.columns.entry(name.clone()).or_insert(!OPTIONAL.contains(&name.as_str()));
-            *seen = *seen || (0..column.len()).any(|i| column.value(i) != 0.0);
+            *seen = *seen || !is_zero(column);
         }
     }
 
     fn by_tile(&self, batch: &PointCloud) -> BTreeMap<TileId, Vec<u32>> {
         let mut by_tile: BTreeMap<TileId, Vec<u32>> = BTreeMap::new();
         let mut run: (Option<TileId>, Vec<u32>) = (None, Vec::new());
+        let mut rect = Rect::EMPTY;
         for index in 0..batch.len() {
-            let tile = self.grid.tile_at(batch.x[index], batch.y[index]);
-            if run.0 != Some(tile)
-                && let Some(before) = run.0.replace(tile)
-            {
-                by_tile.entry(before).or_default().append(&mut run.1);
+            let (x, y) = (batch.x[index], batch.y[index]);
+            if !rect.contains(x, y) {
+                let tile = self.grid.tile_at(x, y);
+                rect = self.grid.rect(tile);
+                if let Some(before) = run.0.replace(tile) {
+                    by_tile.entry(before).or_default().append(&mut run.1);
+                }
             }
             run.1.push(index as u32);
         }
@@ -256,6 +259,14 @@ impl<W: Write> Buckets<W> {
             problem: format!("cannot write the index: {error}"),
         })?;
         Ok((out, index))
+    }
+}
+
+/// Whether all values are zero.
+pub(crate) fn is_zero(column: &Column) -> bool {
+    match column {
+        Column::U8(values) => values.iter().all(|value| *value == 0),
+        other => (0..other.len()).all(|index| other.value(index) == 0.0),
     }
 }
 

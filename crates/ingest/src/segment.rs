@@ -47,11 +47,9 @@ pub(crate) fn encode(cloud: &PointCloud, optional: &[&str]) -> Result<Vec<u8>, S
         }),
     );
     put(&mut out, cloud.source_id.iter().map(|v| v.to_le_bytes()));
-    let is_zero = |column: &Column| (0..column.len()).all(|i| column.value(i) == 0.0);
-    let kept = cloud
-        .extra
-        .iter()
-        .filter(|(name, column)| !(optional.contains(&name.as_str()) && is_zero(column)));
+    let kept = cloud.extra.iter().filter(|(name, column)| {
+        !(optional.contains(&name.as_str()) && crate::scatter::is_zero(column))
+    });
     for (name, column) in kept {
         put_column(&mut out, name, column);
     }

@@ -24,7 +24,13 @@ pub(crate) fn is_company(classification: u8, flags: u8) -> bool {
 
 /// The voxel of a world position.
 pub(crate) fn voxel_of(world_m: [f64; 3]) -> Voxel {
-    world_m.map(|value| (value / VOXEL_M).floor() as i32)
+    world_m.map(|value| floor(value / VOXEL_M))
+}
+
+/// The whole number at or below a value; `f64::floor` is a function call on older processors.
+pub(crate) fn floor(value: f64) -> i32 {
+    let cut = value as i32;
+    cut - i32::from(f64::from(cut) > value)
 }
 
 /// Counts the points of a cloud by voxel, sorted.
@@ -133,6 +139,13 @@ mod tests {
         assert!(isolated(400) && isolated(401));
         assert!(!isolated(402));
         assert!((0..400).all(|index| !isolated(index)));
+    }
+
+    #[test]
+    fn floors() {
+        for value in [0.0, -0.0, 0.5, -0.5, -1.0, 7.999, -7.001, 123_456.0] {
+            assert_eq!(floor(value), f64::floor(value) as i32, "{value}");
+        }
     }
 
     #[test]
