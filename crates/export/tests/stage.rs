@@ -49,6 +49,32 @@ fn one_plot() {
     }
 }
 
+/// Files kept under `golden/`: text as it is, the others by their hash. A difference that is meant
+/// raises the version of the stage; `TIMBERLINE_WRITE_GOLDEN=1` then writes them anew.
+#[test]
+fn the_files_are_those_of_this_version() {
+    let folder = tempfile::tempdir().unwrap();
+    let (outputs, files) = export(folder.path(), 64, [0, 0], 2);
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden");
+    // The GeoPackage names the version of the program.
+    let hashed = outputs.files.iter().filter(|file| file.name != "trees.gpkg");
+    let lines = hashed.map(|file| format!("{}  {}\n", file.hash, file.name));
+    let mut expected = BTreeMap::from([("hashes.txt".to_owned(), lines.collect::<String>())]);
+    for name in ["trees.csv", "trees.dictionary.csv", "dtm.vrt"] {
+        expected.insert(name.to_owned(), String::from_utf8(files[name].clone()).unwrap());
+    }
+    for (name, text) in expected {
+        let path = golden.join(&name);
+        if std::env::var_os("TIMBERLINE_WRITE_GOLDEN").is_some() {
+            std::fs::write(&path, &text).unwrap();
+        }
+        assert!(
+            std::fs::read_to_string(&path).unwrap() == text,
+            "{name} differs from the golden file"
+        );
+    }
+}
+
 #[test]
 fn two_plots_far_apart_get_a_raster_each() {
     let folder = tempfile::tempdir().unwrap();

@@ -117,8 +117,8 @@ fn draw_crowns(figure: &mut Figure<'_>, trees: &[MapTree]) {
     for tree in trees {
         let corners: Vec<[f64; 2]> = tree.crown_m.iter().map(|corner| figure.px(*corner)).collect();
         if extent_px(&corners) >= NARROWEST_CROWN_PX {
-            figure.canvas.outline(&corners, width + 1.2, Paint::sheer(INK, 0.28));
-            figure.canvas.outline(&corners, width, Paint::sheer(PAPER, 0.72));
+            figure.canvas.outline(&corners, width + 1.2, Paint::sheer(INK, 0.22));
+            figure.canvas.outline(&corners, width, Paint::sheer(PAPER, 0.6));
         }
     }
 }

@@ -139,7 +139,9 @@ impl<'a> Scale<'a> {
                 let entry = |(code, count): (u8, u64)| {
                     let (rgb, name) = colour::class(code);
                     let share = count as f64 / all * 100.0;
-                    Entry::Symbol(Symbol::Swatch(rgb), format!("{code} {name}, {share:.1} %"))
+                    let share =
+                        if share < 0.1 { "< 0.1".to_owned() } else { format!("{share:.1}") };
+                    Entry::Symbol(Symbol::Swatch(rgb), format!("{code} {name}, {share} %"))
                 };
                 counts.into_iter().map(entry).collect()
             }

@@ -54,7 +54,7 @@ impl Default for LasOptions {
             version: LasVersion::V1_4,
             scale: 0.001,
             offset: [0.0; 3],
-            software: concat!("Timberline ", env!("CARGO_PKG_VERSION")).to_owned(),
+            software: "Timberline".to_owned(),
             gps_standard_time: true,
             colour: Colour::None,
             dimensions: Vec::new(),
