@@ -3,7 +3,7 @@
 use crate::input::Ranked;
 use rayon::prelude::*;
 use std::ops::Range;
-use timberline_pointcloud::frame::ticks_from_world;
+use timberline_pointcloud::frame::{ticks_from_world, world_from_ticks};
 
 /// Column and row of a cell: the cell's lower corner is this many edges from the world's origin.
 pub(crate) type CellId = [i32; 2];
@@ -59,6 +59,11 @@ impl Cells {
         }
         self.rows.push(cell[1]);
         self.starts.push(self.points.len() as u32);
+    }
+
+    /// Edge of the cells, metres.
+    pub(crate) fn edge_m(&self) -> f64 {
+        world_from_ticks(self.edge_ticks)
     }
 
     /// Number of occupied cells.

@@ -57,9 +57,8 @@ fn maxima(surface: &Surface<'_>) -> Vec<(u32, Window)> {
     let ranked = &surface.ranked;
     let test = |&index: &u32| {
         let place = index as usize;
-        let window = Window::at_height(ranked.params, ranked.height(place));
-        let is_top = ranked.may_be_top(place) && surface.is_maximum(place, window);
-        is_top.then_some((index, window))
+        let window = ranked.may_be_top(place).then(|| surface.test(place)).flatten();
+        window.map(|window| (index, window))
     };
     surface.best.par_iter().flatten().filter_map(test).collect()
 }

@@ -5,9 +5,16 @@ use crate::input::Ranked;
 use crate::window::Window;
 use crate::{Params, WindowKind};
 use rayon::prelude::*;
+use timberline_pointcloud::frame::{TICK_M, TICKS_PER_M};
 
 /// Edge of the coarsest cells: 0.5 m, in ticks of 0.1 mm.
 pub(crate) const CELL_TICKS: i64 = 5_000;
+
+/// Radius in which the spacing of the points is taken.
+const SPACING_REACH_M: f64 = 5.0;
+/// How far from a point its spacing can depend on others: the radius and the diagonal of a cell.
+pub(crate) const SPACING_HALO_M: f64 =
+    SPACING_REACH_M + CELL_TICKS as f64 * TICK_M * std::f64::consts::SQRT_2;
 
 /// The upper surface of the points: the highest supported point of every cell.
 #[derive(Debug)]
@@ -62,8 +69,41 @@ impl<'a> Surface<'a> {
         points.filter(|&&other| is_near(other as usize)).take(wanted).count() == wanted
     }
 
+    /// Mean distance of the first returns around a point, metres: the root of the area of a disc of
+    /// [`SPACING_REACH_M`], in whole cells, for each of them.
+    fn spacing_m(&self, index: usize) -> f64 {
+        let cloud = self.ranked.input.cloud;
+        let [column, row] = self.cells.cell_at(cloud.world(index));
+        let edge_m = self.cells.edge_m();
+        let span = (SPACING_REACH_M / edge_m) as i32;
+        let (mut firsts, mut area) = (0usize, 0i32);
+        for away in -span..=span {
+            let half = f64::from(span * span - away * away).sqrt() as i32;
+            area += 2 * half + 1;
+            let places = self.cells.run(column + away, row - half, row + half);
+            let points = places.flat_map(|place| self.cells.points(place));
+            firsts += points.filter(|&&i| cloud.return_number[i as usize] <= 1).count();
+        }
+        (f64::from(area) / firsts.max(1) as f64).sqrt() * edge_m
+    }
+
+    /// Whether a point is the highest of its window; the window if so.
+    pub(crate) fn test(&self, index: usize) -> Option<Window> {
+        let params = self.ranked.params;
+        let window = Window::at_height(params, self.ranked.height(index));
+        if !self.is_maximum(index, window) {
+            return None;
+        }
+        if params.window != WindowKind::Variable || params.window_min_spacings == 0.0 {
+            return Some(window);
+        }
+        let least_m = params.window_min_spacings * self.spacing_m(index);
+        let wide = window.widened(least_m.min(params.window_max_m));
+        (wide == window || self.is_maximum(index, wide)).then_some(wide)
+    }
+
     /// Whether no supported point of its window outranks a point.
-    pub(crate) fn is_maximum(&self, index: usize, window: Window) -> bool {
+    fn is_maximum(&self, index: usize, window: Window) -> bool {
         let cell = self.cells.cell_at(self.ranked.input.cloud.world(index));
         let span = self.cells.span(window.reach_m());
         !self.cells.around(cell, span).any(|place| self.cell_beats(place, index, window))
@@ -93,7 +133,7 @@ pub(crate) fn cell_ticks(params: &Params) -> i64 {
         WindowKind::Circle => (params.window_m, std::f64::consts::SQRT_2),
         WindowKind::Square => (params.window_m, 1.0),
     };
-    let reach_ticks = smallest_m / 2.0 * timberline_pointcloud::frame::TICKS_PER_M;
+    let reach_ticks = smallest_m / 2.0 * TICKS_PER_M;
     let mut edge = CELL_TICKS;
     while edge > 1 && edge as f64 * diagonal > reach_ticks {
         edge /= 2;

@@ -24,6 +24,11 @@ impl Window {
         Self { size_m, square: params.window == WindowKind::Square }
     }
 
+    /// The same window, at least `size_m` wide.
+    pub(crate) fn widened(self, size_m: f64) -> Self {
+        Self { size_m: self.size_m.max(size_m), ..self }
+    }
+
     /// Half the size: how far the window reaches along an axis.
     pub(crate) fn reach_m(&self) -> f64 {
         self.size_m / 2.0

@@ -96,8 +96,9 @@ fn by_definition(cloud: &PointCloud, height_m: &[f32], params: &Params) -> Vec<u
     tops.into_iter().map(|i| i as u32).collect()
 }
 
-/// A window whose border runs between lattice positions, so that both formulas agree on the border.
+/// A window of known size whose border runs between lattice positions, so that both formulas agree on the border.
 fn off_lattice(mut params: Params) -> Params {
+    params.window_min_spacings = 0.0;
     params.window_m += 0.013;
     params.window_base_m += 0.013;
     params

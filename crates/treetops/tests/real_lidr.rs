@@ -9,9 +9,24 @@
 
 mod common;
 
-use common::{near, normalised, over_tin, peer, tops};
-use timberline_pointcloud::PointCloud;
+use common::{data, normalised, over_tin, tops};
+use timberline_pointcloud::{Nearest2, PointCloud};
 use timberline_treetops::Params;
+
+/// Positions in a table of lidR: columns treeID, x, y, z.
+fn peer(name: &str) -> Vec<[f64; 3]> {
+    let path = data().join("../peers/lidr").join(name);
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let row = |row: csv::StringRecord| [1, 2, 3].map(|i| row[i].parse::<f64>().unwrap());
+    reader.records().map(|record| row(record.unwrap())).collect()
+}
+
+/// Which positions of `these` have one of `those` within a distance.
+fn near(these: &[[f64; 3]], those: &[[f64; 3]], distance_m: f64) -> Vec<bool> {
+    let plane: Vec<[f64; 2]> = those.iter().map(|p| [p[0], p[1]]).collect();
+    let nearest = Nearest2::new(&plane).unwrap();
+    these.iter().map(|p| !nearest.within(&[p[0], p[1]], distance_m).is_empty()).collect()
+}
 
 /// Whether another point of the same height lies in the window: then the program may choose.
 fn is_tied(cloud: &PointCloud, at: [f64; 3], radius_m: f64) -> bool {

@@ -71,7 +71,7 @@ fn facts_of(tops: &[Treetop]) -> Vec<(u64, [f64; 3], f64, f64, f64)> {
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(12))]
+    #![proptest_config(ProptestConfig::with_cases(3))]
 
     #[test]
     fn cut_as_you_like(

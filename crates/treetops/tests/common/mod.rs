@@ -28,14 +28,6 @@ pub(crate) fn read(path: &Path) -> PointCloud {
     cloud
 }
 
-/// Positions in a table of lidR: columns treeID, x, y, z.
-pub(crate) fn peer(name: &str) -> Vec<[f64; 3]> {
-    let path = data().join("../peers/lidr").join(name);
-    let mut reader = csv::Reader::from_path(path).unwrap();
-    let row = |row: csv::StringRecord| [1, 2, 3].map(|i| row[i].parse::<f64>().unwrap());
-    reader.records().map(|record| row(record.unwrap())).collect()
-}
-
 struct Ground {
     position: Point2<f64>,
     z: f64,
@@ -88,11 +80,4 @@ pub(crate) fn over_tin(path: &str) -> (PointCloud, Vec<f32>) {
 /// Treetops of a cloud with heights.
 pub(crate) fn tops((cloud, height_m): &(PointCloud, Vec<f32>), params: &Params) -> Vec<Treetop> {
     find(&Input::new(cloud, height_m), params).unwrap()
-}
-
-/// How many positions of `these` have one of `those` within a distance.
-pub(crate) fn near(these: &[[f64; 3]], those: &[[f64; 3]], distance_m: f64) -> Vec<bool> {
-    let plane: Vec<[f64; 2]> = those.iter().map(|p| [p[0], p[1]]).collect();
-    let nearest = Nearest2::new(&plane).unwrap();
-    these.iter().map(|p| !nearest.within(&[p[0], p[1]], distance_m).is_empty()).collect()
 }
