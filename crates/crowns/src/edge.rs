@@ -13,7 +13,7 @@ const SECTORS: usize = 16;
 const EMPTY_RUN: usize = 2;
 
 /// Whether the ring of [`MARGIN_M`] around a crown has no points at all, of whatever kind, in
-/// [`EMPTY_RUN`] neighbouring sectors: the scan then ends there (or has a hole: open water, say).
+/// two neighbouring sectors of sixteen: the scan then ends there (or has a hole: open water, say).
 ///
 /// Positions and apex are in one frame, metres.
 #[must_use]

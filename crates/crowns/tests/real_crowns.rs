@@ -2,6 +2,11 @@
 //!
 //! `TIMBERLINE_DATA` is a folder with the public scans of lidR, NEON and others; treetops come from
 //! lidR's `locate_trees(lmf(5))` where they were computed, else from a plain local maximum filter.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may stop at what it did not expect"
+)]
 
 use std::path::PathBuf;
 use timberline_crowns::CrownModelParams;

@@ -1,4 +1,9 @@
 //! StarSac on simulated windows with known crowns.
+#![allow(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "a test may stop at what it did not expect"
+)]
 
 mod common;
 
@@ -165,7 +170,7 @@ fn every_reason_for_rejection() {
     let strict = CrownModelParams { max_outlier_ratio: 0.1, ..params.clone() };
     let every_fifth_inside = |i: u32| {
         let r = 0.1 * f64::from(i);
-        at(r, 2.0 * r + if i % 5 == 0 { 4.0 } else { 0.0 }, i)
+        at(r, 2.0 * r + if i.is_multiple_of(5) { 4.0 } else { 0.0 }, i)
     };
     let noisy = Window::new((1..40).map(every_fifth_inside));
     assert_eq!(reason(&noisy, &strict), Some(Rejection::TooManyOutliers));

@@ -1,4 +1,5 @@
 //! The stages on a simulated stand: complete, and the same however it is cut into tiles.
+#![allow(clippy::unwrap_used, reason = "a test may stop at what it did not expect")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! The L1 paraboloid against known surfaces, brute force, shifted frames and every degenerate case.
+#![allow(clippy::unwrap_used, reason = "a test may stop at what it did not expect")]
 
 use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;

@@ -1,4 +1,5 @@
 //! The stage on a row of crowns across tiles: the same labels however the row is cut.
+#![allow(clippy::unwrap_used, reason = "a test may stop at what it did not expect")]
 
 use std::collections::BTreeMap;
 use timberline_artefact::alone::Alone;
