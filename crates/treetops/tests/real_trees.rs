@@ -1,6 +1,11 @@
 //! The default parameters on scans with known trees.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "these are tests")]
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
 
 mod common;
 
