@@ -94,7 +94,7 @@ fn best_vertex(cells: &[[f64; 3]]) -> f64 {
                 for d in 0..c {
                     if let Some([p0, p3, p4, p5]) = through([a, b, c, d].map(|i| cells[i])) {
                         let on = Paraboloid { phi: [p0, p0, 0.0, p3, p4, p5] };
-                        if p0 <= -1.0 / 9.0 && p0 >= -100.0 {
+                        if (-100.0..=-1.0 / 9.0).contains(&p0) {
                             best = best.min(objective(&on, cells));
                         }
                     }
