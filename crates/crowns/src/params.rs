@@ -231,7 +231,7 @@ impl Default for CrownFitParams {
             smallest_axis_m: 0.1,
             prior_half_width_m: 0.5,
             polygon_above: 0.3,
-            base_density: 0.1,
+            base_density: 0.25,
         }
     }
 }
