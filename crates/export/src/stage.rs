@@ -30,14 +30,19 @@ pub struct Params {
     pub write_rasters: bool,
     /// Write `points.laz`.
     pub write_points: bool,
-    /// Edge of a cell of the canopy height model.
+    /// Edge of a cell of the canopy height model; doubled where points are too few, see
+    /// `chm_points_a_cell`.
     #[schemars(range(min = 0.05, max = 20.0), extend("x-unit" = "m"))]
     pub chm_cell_m: f64,
+    /// The edge of a cell is doubled until there are so many points a cell on average. 0 keeps
+    /// `chm_cell_m` whatever the density.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub chm_points_a_cell: f64,
     /// How far a cell of the canopy height model without points looks for cells with points, of which
     /// it takes the mean weighted by the inverse squared distance, if they lie in at least three of
     /// the quadrants around it. 0 leaves all gaps open.
-    #[schemars(range(min = 0.0, max = 10.0), extend("x-unit" = "m"))]
-    pub chm_fill_m: f64,
+    #[schemars(range(min = 0, max = 20), extend("x-unit" = "cell"))]
+    pub chm_fill_cells: u32,
     /// Widest gap in the points across which the terrain is drawn; wider ones and the surroundings
     /// of the survey stay empty.
     #[schemars(
@@ -57,7 +62,8 @@ impl Default for Params {
             write_rasters: true,
             write_points: true,
             chm_cell_m: 0.5,
-            chm_fill_m: 1.0,
+            chm_points_a_cell: 0.5,
+            chm_fill_cells: 2,
             dtm_gap_m: 30.0,
             las_scale: 0.001,
         }

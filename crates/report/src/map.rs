@@ -54,6 +54,7 @@ pub struct MapContents<'a> {
 pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
     let MapContents { extent, terrain, canopy, .. } = contents;
     let top = canopy.range(LEFT_OUT).map_or(1.0, |[_, high]| high.max(1.0));
+    let canopy = &without_pits(canopy);
     let steepening = exaggeration(terrain);
     let mut figure = Figure::new(Page {
         title: contents.title,
@@ -68,6 +69,27 @@ pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
     draw_crowns(&mut figure, contents.trees);
     draw_tops(&mut figure, contents.trees);
     Ok(figure.finish())
+}
+
+/// The canopy as it is drawn: a cell far below most of its neighbours (a pulse that went through a
+/// crown, Khosravipour et al. 2014, PE&RS 80(9)) takes their median.
+fn without_pits(canopy: &Grid) -> Grid {
+    const PIT_M: f64 = 4.0;
+    let window = canopy.window;
+    let mut drawn = canopy.clone();
+    for row in window.row0..window.end_row() {
+        for column in window.column0..window.end_column() {
+            let Some(own) = canopy.get(column, row) else { continue };
+            let around = (-1..=1).flat_map(|dr| (-1..=1).map(move |dc| (column + dc, row + dr)));
+            let mut heights: Vec<f64> = around.filter_map(|(c, r)| canopy.get(c, r)).collect();
+            heights.sort_by(f64::total_cmp);
+            let median = heights[(heights.len() - 1) / 2];
+            if own < median - PIT_M {
+                drawn.values[window.index(column, row)] = median as f32;
+            }
+        }
+    }
+    drawn
 }
 
 fn legend(top: f64, has_trees: bool, steepening: f64) -> Vec<Entry> {
@@ -137,5 +159,24 @@ fn draw_tops(figure: &mut Figure<'_>, trees: &[MapTree]) {
     for tree in trees {
         let place = figure.px(tree.top_m);
         draw_symbol(&mut figure.canvas, Symbol::Dot(PAPER), place, radius);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timberline_pointcloud::Window;
+
+    #[test]
+    fn pits_are_closed_and_edges_stay() {
+        let window = Window { column0: 0, row0: 0, columns: 5, rows: 3 };
+        let mut values = vec![20.0_f32; window.len()];
+        values[7] = 1.0;
+        for row in 0..3 {
+            values[row * 5] = 0.0;
+        }
+        let drawn = without_pits(&Grid { cell_m: 0.5, window, values });
+        assert_eq!(drawn.values[7], 20.0);
+        assert_eq!([drawn.values[0], drawn.values[5], drawn.values[10]], [0.0, 0.0, 0.0]);
     }
 }

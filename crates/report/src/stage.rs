@@ -20,7 +20,7 @@ use timberline_pointcloud::{Bounds3, Footprint, Rect, TileId, Window, closing, g
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Edge of a cell of the canopy on the map; doubled until there are two points a cell on average
+    /// Edge of a cell of the canopy on the map; doubled until there is a point a cell on average
     /// and the map is not too large.
     #[schemars(range(min = 0.05, max = 20.0), extend("x-unit" = "m"))]
     pub cell_m: f64,
@@ -49,7 +49,7 @@ pub struct MapStage;
 const NAME: &str = "map";
 
 /// Points that a cell of the canopy should have on average.
-const POINTS_A_CELL: f64 = 2.0;
+const POINTS_A_CELL: f64 = 1.0;
 /// Cells around an empty one that are looked at to fill it.
 const FILL_CELLS: u32 = 2;
 
@@ -157,10 +157,15 @@ impl Survey {
         self.tiles.iter().filter(move |tile| tile.bounds.rect().touches(&rect))
     }
 
-    /// Points a square metre.
+    /// Points in a rectangle's tiles.
+    fn points(&self, rect: &Rect) -> u64 {
+        self.tiles_in(rect).map(|tile| tile.points).sum()
+    }
+
+    /// Points in a square metre that has any.
     fn density(&self, rect: &Rect) -> f64 {
-        let sum = |value: fn(&TileFacts) -> u64| self.tiles_in(rect).map(value).sum::<u64>() as f64;
-        sum(|tile| tile.points) / sum(|tile| tile.occupied_m2).max(1.0)
+        let occupied: u64 = self.tiles_in(rect).map(|tile| tile.occupied_m2).sum();
+        self.points(rect) as f64 / (occupied as f64).max(1.0)
     }
 }
 
@@ -201,7 +206,7 @@ fn draw_site(
     let hectares = occupied as f64 * cell_m * cell_m / 10_000.0;
     Ok(draw(&MapContents {
         title: &title,
-        subtitle: &layers.subtitle(hectares, density, &crs),
+        subtitle: &layers.subtitle(hectares, survey.points(&site.extent), &crs),
         extent: site.extent,
         crs: &crs,
         terrain: layers.terrain.as_ref().unwrap_or(&Grid::empty(layers.canopy.window, cell_m)),
@@ -312,16 +317,25 @@ impl Layers {
         self.canopy.values = gridding::fill_gaps(&around.values, window, FILL_CELLS);
     }
 
-    fn subtitle(&self, hectares: f64, density: f64, crs: &Crs) -> String {
+    fn subtitle(&self, hectares: f64, points: u64, crs: &Crs) -> String {
         let trees = grouped(self.trees.len() as i64);
         let mut parts = vec![format!("{trees} trees"), format!("{hectares:.2} ha")];
+        let density = points as f64 / (hectares * 10_000.0).max(1e-9);
         parts.push(format!("{density:.1} points/m²"));
         if self.tallest_m > 0.0 {
             parts.push(format!("tallest {:.1} m", self.tallest_m));
         }
-        parts.push(crs.name.clone());
+        parts.push(crs_name(crs));
         parts.join("  ·  ")
     }
+}
+
+/// The name of a CRS: by its EPSG code where it is known only by that.
+fn crs_name(crs: &Crs) -> String {
+    let bare = |code: &u32| crs.name == format!("EPSG:{code}");
+    let defined = || crs_definitions::from_code(u16::try_from(crs.epsg.filter(bare)?).ok()?);
+    let name = defined().and_then(|definition| definition.wkt.split('"').nth(1));
+    name.map_or_else(|| crs.name.clone(), |name| format!("{name} ({})", crs.name))
 }
 
 #[cfg(test)]
@@ -332,6 +346,13 @@ mod tests {
     fn own_files_are_known_by_name() {
         assert!(["map.png", "map-3.png"].into_iter().all(is_ours));
         assert!(!["map-.png", "map-old.png", "treemap.png", "dtm.tif"].into_iter().any(is_ours));
+    }
+
+    #[test]
+    fn a_bare_code_gets_its_name() {
+        let crs = |name: &str| Crs { epsg: Some(3005), name: name.to_owned(), ..Crs::default() };
+        assert_eq!(crs_name(&crs("EPSG:3005")), "NAD83 / BC Albers (EPSG:3005)");
+        assert_eq!(crs_name(&crs("my own")), "my own");
     }
 
     #[test]

@@ -22,10 +22,12 @@ pub(super) fn write(
     let crs = survey.crs.clone().unwrap_or_default();
     let sites = survey.footprint.sites();
     let windows = |cell_m| sites.iter().map(|site| Window::touching(site, cell_m)).collect();
+    let pool = pool(params, survey.density_per_m2());
+    let chm_cell_m = params.chm_cell_m * f64::from(pool);
     let canopy = Product {
         stem: "chm",
-        cell_m: params.chm_cell_m,
-        windows: windows(params.chm_cell_m),
+        cell_m: chm_cell_m,
+        windows: windows(chm_cell_m),
         description: "Highest point of the cell above ground",
         unit: "metre",
         elevation: false,
@@ -40,7 +42,8 @@ pub(super) fn write(
     };
     let Survey { chm, dtm, .. } = survey;
     let cancelled = || context.check_cancelled().map_err(StageError::from);
-    canopy.write(&crs, folder, &cancelled, &mut |window| canopy_values(chm, window, params))?;
+    canopy
+        .write(&crs, folder, &cancelled, &mut |window| canopy_values(chm, window, pool, params))?;
     let dtm_cell_m = terrain.cell_m;
     let mut values = |window| terrain_values(dtm, chm, window, dtm_cell_m, params);
     terrain.write(&crs, folder, &cancelled, &mut values)
@@ -92,9 +95,40 @@ impl Product {
     }
 }
 
-fn canopy_values(canopy: &mut Mosaic, window: Window, params: &Params) -> Result<Vec<f32>, Error> {
-    let reach = (params.chm_fill_m / params.chm_cell_m).round() as u32;
-    let values = canopy.read(window.grown(reach))?;
+/// How many cells of `chm_cell_m` along an edge make one of the raster: a power of two.
+fn pool(params: &Params, density_per_m2: f64) -> u32 {
+    const MOST: u32 = 64;
+    let points = |pool: u32| {
+        let edge = params.chm_cell_m * f64::from(pool);
+        edge * edge * density_per_m2
+    };
+    let mut pool = 1;
+    while points(pool) < params.chm_points_a_cell && pool < MOST {
+        pool *= 2;
+    }
+    pool
+}
+
+fn canopy_values(
+    canopy: &mut Mosaic,
+    window: Window,
+    pool: u32,
+    params: &Params,
+) -> Result<Vec<f32>, Error> {
+    let reach = params.chm_fill_cells;
+    let around = window.grown(reach);
+    let fine = Window {
+        column0: around.column0 * i64::from(pool),
+        row0: around.row0 * i64::from(pool),
+        columns: around.columns * pool,
+        rows: around.rows * pool,
+    };
+    let mut values = vec![f32::NAN; around.len()];
+    for (place, value) in canopy.read(fine)?.iter().enumerate() {
+        let (row, column) = (place / fine.columns as usize, place % fine.columns as usize);
+        let cell = row / pool as usize * around.columns as usize + column / pool as usize;
+        values[cell] = values[cell].max(*value);
+    }
     Ok(gridding::fill_gaps(&values, window, reach))
 }
 
@@ -132,4 +166,28 @@ fn terrain_values(
         }
     }
     Ok(values)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sparse_points_get_larger_cells() {
+        let params = Params::default();
+        let found = [12.0, 2.0, 1.6, 0.3, 0.0].map(|density| pool(&params, density));
+        assert_eq!(found, [1, 1, 2, 4, 64]);
+        assert_eq!(pool(&Params { chm_points_a_cell: 0.0, ..params }, 0.1), 1);
+    }
+
+    #[test]
+    fn pooled_cells_keep_the_highest() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut canopy = Mosaic::new(folder.path()).unwrap();
+        let fine = Window { column0: -4, row0: 2, columns: 4, rows: 2 };
+        canopy.push(fine, &[1.0, f32::NAN, 5.0, 2.0, 3.0, 0.0, f32::NAN, 4.0]).unwrap();
+        let params = Params { chm_fill_cells: 0, ..Params::default() };
+        let window = Window { column0: -2, row0: 1, columns: 2, rows: 1 };
+        assert_eq!(canopy_values(&mut canopy, window, 2, &params).unwrap(), [3.0, 5.0]);
+    }
 }

@@ -28,6 +28,8 @@ pub(super) struct Survey {
     /// Stages that made the inputs: name, version and parameters.
     pub(super) stages: BTreeMap<String, (u32, String)>,
     pub(super) points: u64,
+    /// Square metres of the lattice of whole metres that hold points.
+    occupied_m2: u64,
     latest_gps_time: f64,
     bounds: Bounds3,
     tiles: u64,
@@ -53,6 +55,7 @@ impl Survey {
             columns: BTreeMap::new(),
             stages: BTreeMap::new(),
             points: 0,
+            occupied_m2: 0,
             latest_gps_time: 0.0,
             bounds: Bounds3::EMPTY,
             tiles: tiles.len() as u64,
@@ -86,16 +89,31 @@ impl Survey {
         self.points += cloud.len() as u64;
         let times = cloud.gps_time.iter().copied().filter(|time| time.is_finite());
         self.latest_gps_time = times.fold(self.latest_gps_time, f64::max);
-        for index in 0..cloud.len() {
-            let world = cloud.world(index);
-            self.bounds.include(world);
-            self.footprint.include(world[0], world[1]);
-        }
+        self.add_places(&cloud);
         if params.write_rasters {
             let (window, values) = gridding::highest(&cloud, &heights.height_m, params.chm_cell_m);
             self.chm.push(window, &values)?;
         }
         Ok(())
+    }
+
+    fn add_places(&mut self, cloud: &PointCloud) {
+        let mut squares = Vec::with_capacity(cloud.len());
+        for index in 0..cloud.len() {
+            let world = cloud.world(index);
+            self.bounds.include(world);
+            self.footprint.include(world[0], world[1]);
+            squares.push([world[0].floor() as i64, world[1].floor() as i64]);
+        }
+        squares.sort_unstable();
+        squares.dedup();
+        // Edges of tiles are whole metres, so no square is counted twice.
+        self.occupied_m2 += squares.len() as u64;
+    }
+
+    /// Points in a square metre that has any.
+    pub(super) fn density_per_m2(&self) -> f64 {
+        self.points as f64 / (self.occupied_m2 as f64).max(1.0)
     }
 
     /// Takes the terrain of a tile, in the units of the vertical system of the CRS.
