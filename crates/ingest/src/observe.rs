@@ -12,8 +12,11 @@ const MAX_CELLS: usize = 1 << 15;
 const MIN_POINTS: u32 = 20;
 /// A cell whose lowest point is nearer to 0 than this has its ground at 0.
 const NEAR_ZERO_M: f64 = 0.5;
-/// The share of cells with ground at 0 from which a file counts as normalised.
+/// The share of cells, or of points of the ground class, at 0 from which a file counts as normalised.
 const NORMALISED_SHARE: f64 = 0.9;
+/// So many points of the ground class decide alone: points below the terrain they were normalised
+/// with would hide it from the cells.
+const ENOUGH_GROUND: u64 = 100;
 const GROUND: u8 = 2;
 /// Room for rounding in bounds that a header states.
 const BOUNDS_SLACK_M: f64 = 0.01;
@@ -136,9 +139,9 @@ impl Observed {
 
     /// Whether elevations look like heights above ground: the ground is at 0 everywhere.
     pub(crate) fn is_normalised(&self) -> bool {
-        if self.ground > 0 && (self.ground_near_zero as f64) < NORMALISED_SHARE * self.ground as f64
-        {
-            return false;
+        let at_zero = self.ground_near_zero as f64 >= NORMALISED_SHARE * self.ground as f64;
+        if self.ground >= ENOUGH_GROUND || (self.ground > 0 && !at_zero) {
+            return at_zero;
         }
         self.share_at_zero().is_some_and(|share| share >= NORMALISED_SHARE)
     }
@@ -164,11 +167,13 @@ impl Observed {
             ));
         }
         if self.is_normalised() {
-            let share = 100.0 * self.share_at_zero().unwrap_or_default();
             notes.say(format!(
-                "the elevations look like heights above ground (the lowest point is within \
-                 {NEAR_ZERO_M} m of 0 in {share:.0} % of cells of {} m): tree heights are right, the \
-                 terrain is flat",
+                "the elevations look like heights above ground (within {NEAR_ZERO_M} m of 0: {} of {} \
+                 points of the ground class, the lowest point in {:.0} % of cells of {} m): tree \
+                 heights are right, the terrain is flat",
+                self.ground_near_zero,
+                self.ground,
+                100.0 * self.share_at_zero().unwrap_or_default(),
                 self.cell_m
             ));
         }

@@ -90,16 +90,16 @@ pub struct TilesParams {
     /// What to do with points flagged as overlap or of class 12: `keep` or `drop`.
     #[schemars(extend("x-source" = "ASPRS LAS 1.4-R15, tables 9 and 16"))]
     pub overlap: Overlap,
-    /// A point is isolated, and left out, when its voxel of 4 m and the 26 around it hold at most this
-    /// many points although the 9 columns of voxels hold ten times as many: birds, clouds, multipath.
-    /// 0 keeps all points.
-    #[schemars(range(max = 1000), extend("x-unit" = "points", "x-source" = "LAStools, lasnoise: isolated 5; lidR, ivf: n 6"))]
+    /// Points that hang above everything, such as birds and clouds, are left out when the 9 voxel
+    /// columns of 4 m around hold at most this many from one voxel below them upwards, then an empty
+    /// layer, then ten times as many. 0 keeps all points.
+    #[schemars(range(max = 1000), extend("x-unit" = "points", "x-source" = "after LAStools, lasnoise (step 4) and lidR, ivf"))]
     pub isolated_points: u32,
 }
 
 impl Default for TilesParams {
     fn default() -> Self {
-        Self { drop_withheld: true, drop_noise: true, overlap: Overlap::Keep, isolated_points: 5 }
+        Self { drop_withheld: true, drop_noise: true, overlap: Overlap::Keep, isolated_points: 2 }
     }
 }
 

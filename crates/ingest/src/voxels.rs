@@ -2,7 +2,9 @@
 //!
 //! The counts of a tile's surroundings are the sum over all files, so the answer depends neither on
 //! the tiles nor on the sequence of files. After the isolated voxel filter of lidR (`ivf`) and
-//! LAStools (`lasnoise`), with one more condition that keeps sparse surveys whole.
+//! LAStools (`lasnoise`). Those also take the few returns that reach the ground under an old forest,
+//! and the tips of its highest trees: here only what hangs above everything, with a gap, is isolated.
+//! Points below the ground are the ground filter's affair.
 
 use timberline_pointcloud::PointCloud;
 
@@ -12,8 +14,9 @@ pub(crate) const VOXEL_M: f64 = 4.0;
 /// A voxel: index of its cell along x, y, z.
 pub(crate) type Voxel = [i32; 3];
 
-/// How many points must lie in the columns around, for each point that makes a voxel isolated.
-const COLUMN_FACTOR: u64 = 10;
+/// How many points must lie below, for each point that makes a voxel isolated: in sparse or empty
+/// surroundings nothing is.
+const MASS_FACTOR: u64 = 10;
 
 const WITHHELD: u8 = 1 << 2;
 
@@ -79,21 +82,23 @@ impl Isolation {
         Self { counts, limit: u64::from(limit) }
     }
 
-    /// Whether a voxel and the 26 around it hold few points although its columns hold many.
+    /// Whether the points of a voxel hang in the air above everything: a handful at most in the 9
+    /// columns from the layer below the voxel upwards, then at least one empty layer, then many.
+    ///
+    /// The ground under a canopy has nothing below it and so is never isolated; the tip of a crown
+    /// has the crown within a layer.
     pub(crate) fn is_isolated(&self, voxel: Voxel) -> bool {
         let [x, y, z] = voxel;
-        let near = |low: i32, high: i32| {
-            let mut sum = 0;
-            for dx in -1..=1 {
-                for dy in -1..=1 {
-                    let column = [x.saturating_add(dx), y.saturating_add(dy)];
-                    sum += self.sum([column[0], column[1], low], [column[0], column[1], high]);
-                }
-            }
-            sum
+        let layers = |low: i32, high: i32| -> u64 {
+            let columns = (-1..=1).flat_map(|dx| (-1..=1).map(move |dy| (dx, dy)));
+            columns
+                .map(|(dx, dy)| [x.saturating_add(dx), y.saturating_add(dy)])
+                .map(|[x, y]| self.sum([x, y, low], [x, y, high]))
+                .sum()
         };
-        let cube = near(z.saturating_sub(1), z.saturating_add(1));
-        cube <= self.limit && near(i32::MIN, i32::MAX) >= COLUMN_FACTOR * (self.limit + 1)
+        layers(z.saturating_sub(1), i32::MAX) <= self.limit
+            && layers(z.saturating_sub(2), z.saturating_sub(2)) == 0
+            && layers(i32::MIN, z.saturating_sub(3)) >= MASS_FACTOR * (self.limit + 1)
     }
 
     /// Points in the voxels from one to another of the same column.
@@ -132,13 +137,26 @@ mod tests {
     }
 
     #[test]
-    fn birds_and_multipath_are_isolated_treetops_are_not() {
-        let cloud = forest(&[[10.0, 10.0, 90.0], [5.0, 5.0, -60.0], [8.0, 8.0, 19.0]]);
-        let isolation = Isolation::new(count(&cloud), 5);
+    fn birds_are_isolated_treetops_and_ground_are_not() {
+        let cloud = forest(&[[10.0, 10.0, 36.0], [5.0, 5.0, -60.0], [8.0, 8.0, 22.9]]);
+        let isolation = Isolation::new(count(&cloud), 2);
         let isolated = |index: usize| isolation.is_isolated(voxel_of(cloud.world(index)));
-        assert!(isolated(400) && isolated(401));
-        assert!(!isolated(402));
+        assert!(isolated(400));
+        assert!(!isolated(401) && !isolated(402));
         assert!((0..400).all(|index| !isolated(index)));
+    }
+
+    #[test]
+    fn a_single_return_from_the_ground_under_a_canopy_stays() {
+        let mut cloud = PointCloud::default();
+        for i in 0..20 {
+            for j in 0..20 {
+                cloud.push_world([f64::from(i), f64::from(j), 40.0], &Point::default());
+            }
+        }
+        cloud.push_world([10.0, 10.0, 0.0], &Point::default());
+        let isolation = Isolation::new(count(&cloud), 2);
+        assert!(!isolation.is_isolated(voxel_of([10.0, 10.0, 0.0])));
     }
 
     #[test]
@@ -152,7 +170,7 @@ mod tests {
     fn a_sparse_cloud_is_left_alone() {
         let mut cloud = PointCloud::default();
         (0..50).for_each(|i| cloud.push_world([f64::from(i) * 40.0, 0.0, 0.0], &Point::default()));
-        let isolation = Isolation::new(count(&cloud), 5);
+        let isolation = Isolation::new(count(&cloud), 2);
         assert!((0..50).all(|i| !isolation.is_isolated(voxel_of(cloud.world(i)))));
     }
 
@@ -163,7 +181,7 @@ mod tests {
             let noise = Point { classification: 7, ..Point::default() };
             cloud.push_world([10.0, 10.0, 90.0], &noise);
         }
-        let isolation = Isolation::new(count(&cloud), 5);
+        let isolation = Isolation::new(count(&cloud), 2);
         assert!(isolation.is_isolated(voxel_of([10.0, 10.0, 90.0])));
     }
 }

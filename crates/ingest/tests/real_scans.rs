@@ -45,12 +45,12 @@ fn normalised_scans_are_recognised_and_others_are_not() {
                 scattered.notes
             );
             let name = path.to_string_lossy();
-            let expected = ["SJER", "MixedConifer", "Megaplot", "pycrown", "rLiDAR", "edge"];
-            let mountains = ["hj_andrews", "lasR_bcts", "MixedEucaNat", "Topography", "ALS_Clip"];
-            if mountains.iter().any(|part| name.contains(part)) {
+            let normalised = ["SJER", "MixedConifer", "Megaplot", "pycrown", "rLiDAR"];
+            let others = ["hj_andrews", "lasR_bcts", "MixedEucaNat", "Topography", "ALS_Clip"];
+            if others.iter().any(|part| name.contains(part)) {
                 assert!(!scattered.is_normalised, "{name}");
             }
-            if expected[..3].iter().any(|part| name.contains(part)) {
+            if normalised.iter().any(|part| name.contains(part)) {
                 assert!(scattered.is_normalised, "{name}");
             }
         }

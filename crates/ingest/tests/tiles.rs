@@ -88,7 +88,7 @@ fn grid(edge: u32, origin: i64) -> TileGrid {
     TileGrid::new(edge, [origin, -origin]).unwrap()
 }
 
-/// Two files that overlap by 10 m, with birds and multipath, noise and withheld points.
+/// Two files that overlap by 10 m, with birds, noise and withheld points.
 fn campaign() -> Vec<Vec<u8>> {
     let (mut a, mut b) = (stand(1000, 60), stand(1050, 60));
     let at = |x: f64, z: f64| Point {
@@ -101,8 +101,8 @@ fn campaign() -> Vec<Vec<u8>> {
         ..Point::default()
     };
     a.push(at(1020.0, 400.0));
-    a.push(at(1063.9, 250.0));
-    b.push(at(1064.1, 250.1));
+    a.push(at(1063.9, 370.0));
+    b.push(at(1064.1, 370.1));
     b.push(Point { classification: Classification::HighNoise, ..at(1080.0, 330.0) });
     b.push(Point { is_withheld: true, ..at(1081.0, 305.0) });
     vec![file(&a, 6), file(&b, 6)]
