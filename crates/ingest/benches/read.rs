@@ -2,7 +2,13 @@
 //!
 //! On one thread, so that the figures are CPU time. With TIMBERLINE_DATA set, on a real scan
 //! (`als/lasR_bcts`), else on generated points.
-#![allow(clippy::unwrap_used, clippy::print_stdout, missing_docs)]
+#![allow(
+    clippy::unwrap_used,
+    clippy::panic,
+    clippy::print_stdout,
+    missing_docs,
+    reason = "test code"
+)]
 
 use criterion::{Criterion, Throughput};
 use std::hint::black_box;

@@ -1,5 +1,6 @@
 //! Files of every LAS version and point format, plain and compressed, written by the `las` crate
 //! and read back.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "test code")]
 
 use las::point::{Classification, Format, ScanDirection};
 use las::{Builder, Color, Point, Transform, Vector, Version, Writer};

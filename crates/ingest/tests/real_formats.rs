@@ -1,5 +1,6 @@
 //! Every file of the collection of formats, oddities and broken files is read or refused: no
 //! panic, no hang, an error that names file, place and remedy.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "test code")]
 
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -121,9 +122,9 @@ fn every_file_is_read_or_refused() {
         thread.join().unwrap().unwrap();
         let seconds = start.elapsed().as_secs_f64();
         if outcome.is_refused {
-            refused += 1
+            refused += 1;
         } else {
-            read_count += 1
+            read_count += 1;
         }
         let text = outcome.text.replace(&*path.to_string_lossy(), "FILE");
         writeln!(table, "| {name} | {} | {seconds:.2} s |", text.replace('|', "/")).unwrap();
@@ -131,8 +132,11 @@ fn every_file_is_read_or_refused() {
             writeln!(sums, "{name},{}", outcome.facts).unwrap();
         }
     }
-    println!("| file | outcome | time |\n|---|---|---|\n{table}");
-    println!("{} files: {read_count} read, {refused} refused", paths.len());
+    let table = format!(
+        "{} files: {read_count} read, {refused} refused\n\n| file | outcome | time |\n|---|---|---|\n{table}",
+        paths.len()
+    );
+    println!("{table}");
     if let Ok(folder) = std::env::var("TIMBERLINE_TABLES") {
         std::fs::write(Path::new(&folder).join("formats_table.md"), &table).unwrap();
         std::fs::write(Path::new(&folder).join("formats_sums.csv"), &sums).unwrap();

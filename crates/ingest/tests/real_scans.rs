@@ -1,7 +1,8 @@
 //! What is known about the real scans is found by the reader: normalised or not, duplicates across
 //! adjacent files, tile edges, and that nothing is lost on the way to the tiles.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "test code")]
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use timberline_ingest::gather::gather;
 use timberline_ingest::scatter::{Scattered, scatter};
 use timberline_ingest::shard::ShardReader;
@@ -22,7 +23,7 @@ fn data(pattern: &str) -> Vec<PathBuf> {
     files
 }
 
-fn run(path: &PathBuf, grid: TileGrid) -> (Vec<u8>, Scattered) {
+fn run(path: &Path, grid: TileGrid) -> (Vec<u8>, Scattered) {
     let file = LasFile::open(path, UnitChoice::default(), None).unwrap();
     scatter(file, grid, &ScatterParams::default(), Vec::new(), |_| Ok(())).unwrap()
 }
@@ -69,7 +70,7 @@ fn tiles_of_three_scans_hold_all_their_points() {
         files.iter().map(|path| survey(path, UnitChoice::default(), None).unwrap()).collect();
     let edge = tile_edge_m(&facts, BLOCK_POINTS);
     facts.iter().for_each(|f| {
-        println!("{} points, {:?} per m2, {}", f.points, f.density_per_m2, f.crs.name)
+        println!("{} points, {:?} per m2, {}", f.points, f.density_per_m2, f.crs.name);
     });
     println!("tile edge {edge} m");
     assert_eq!(edge, 128);

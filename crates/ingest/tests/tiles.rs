@@ -1,4 +1,5 @@
 //! From files to tiles: what is in a tile depends neither on the tiles nor on the sequence of files.
+#![allow(clippy::unwrap_used, clippy::panic, clippy::print_stdout, reason = "test code")]
 
 use std::collections::BTreeMap;
 use std::io::Cursor;
