@@ -114,7 +114,7 @@ mod architecture {
         assert_eq!(own("pointcloud", "dependencies"), Vec::<String>::new());
         let forbidden = [
             "fs", "File", "PathBuf", "Path", "io", "tempfile", "forest", "tree_id", "crown",
-            "treetop", "stem",
+            "treetop",
         ];
         let mut faults = Vec::new();
         for source in sources("pointcloud") {

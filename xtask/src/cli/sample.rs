@@ -15,8 +15,8 @@ use timberline_synth::sample;
 #[derive(Debug, clap::Args)]
 pub struct Args {
     /// Folder to write to
-    #[arg(default_value = "data-samples")]
-    folder: PathBuf,
+    #[arg(long, value_name = "DIR", default_value = "data-samples")]
+    out: PathBuf,
 }
 
 /// Runs the command.
@@ -25,7 +25,7 @@ pub struct Args {
 /// When a file cannot be written.
 pub fn run(args: &Args) -> Result<u8> {
     let stand = sample::als_stand()?;
-    let folder = args.folder.join("als-stand");
+    let folder = args.out.join("als-stand");
     let crs = utm_crs(u32::from(stand.epsg));
     for tile in &stand.tiles {
         write_scan(&folder.join(&tile.name), &tile.cloud, &crs)?;
