@@ -5,16 +5,6 @@
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// Slices that belong together have different lengths.
-    #[error("column `{column}` has {found} values for {expected} points")]
-    Length {
-        /// Name of the column.
-        column: &'static str,
-        /// Number of points.
-        expected: usize,
-        /// Number of values found.
-        found: usize,
-    },
     /// A coordinate that is not finite.
     #[error("cell {index} of the crown's surface has the {axis} coordinate {value}")]
     NotFinite {

@@ -7,6 +7,18 @@
 //!
 //! Everything works on positions relative to a tree's apex, and on grids fixed in the world, so a
 //! crown is the same in whatever tile or frame its points were read.
+//!
+//! ```
+//! use timberline_crowns::{CrownModelParams, Window, starsac::fit_window};
+//! // Echoes on a cone that falls 2 m per metre, relative to its apex.
+//! let echo = |i: u32| (i, [0.05 * f64::from(i), 0.0, -0.1 * f64::from(i)], true);
+//! let window = Window::new((1..60).map(echo));
+//! let outcome = fit_window(&window, &CrownModelParams::default(), 7);
+//! let crown = outcome.accepted().ok_or("rejected")?;
+//! assert!((crown.model.depth(1.0) - 2.0).abs() < 1e-9);
+//! assert_eq!((crown.grade(), crown.outliers), (59, 0));
+//! # Ok::<(), &str>(())
+//! ```
 
 pub mod base;
 pub mod edge;
