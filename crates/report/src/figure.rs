@@ -5,6 +5,7 @@ use crate::canvas::{Canvas, Paint};
 use crate::colour::{GREY, INK, NO_DATA, PAPER, Ramp, Rgb};
 use crate::text::{Align, Fonts, Style, grouped};
 use crate::ticks::{decimals, round_below, ticks};
+use rayon::prelude::*;
 use timberline_artefact::Crs;
 use timberline_pointcloud::Rect;
 
@@ -128,16 +129,20 @@ impl<'a> Figure<'a> {
         ]
     }
 
-    /// Paints the map pixel by pixel: `colour` tells that of a world position.
-    pub fn paint(&mut self, mut colour: impl FnMut([f64; 2]) -> Rgb) {
-        let extent = self.page.extent;
-        for row in 0..self.height as i64 {
-            for column in 0..self.width as i64 {
-                let (u, v) = (column as f64 + 0.5, self.height - row as f64 - 0.5);
-                let world = [u / self.px_per_m, v / self.px_per_m];
-                let colour = colour([extent.min[0] + world[0], extent.min[1] + world[1]]);
-                let (x, y) = (column + self.left as i64, row + self.top as i64);
-                self.canvas.blend(x, y, Paint::solid(colour), 1.0);
+    /// Paints the map pixel by pixel, rows side by side: `colour` tells that of a world position.
+    pub fn paint(&mut self, colour: impl Fn([f64; 2]) -> Rgb + Sync) {
+        let (corner, scale, height) = (self.page.extent.min, self.px_per_m, self.height);
+        let columns = self.width as u32;
+        let row = |row: u32| -> Vec<Rgb> {
+            let y = corner[1] + (height - f64::from(row) - 0.5) / scale;
+            let x = |column: u32| corner[0] + (f64::from(column) + 0.5) / scale;
+            (0..columns).map(|column| colour([x(column), y])).collect()
+        };
+        let rows: Vec<Vec<Rgb>> = (0..height as u32).into_par_iter().map(row).collect();
+        for (row, colours) in rows.iter().enumerate() {
+            for (column, colour) in colours.iter().enumerate() {
+                let (x, y) = (column as i64 + self.left as i64, row as i64 + self.top as i64);
+                self.canvas.blend(x, y, Paint::solid(*colour), 1.0);
             }
         }
     }

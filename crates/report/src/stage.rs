@@ -20,8 +20,8 @@ use timberline_pointcloud::{Bounds3, Footprint, Rect, TileId, Window, closing, g
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Edge of a cell of the canopy on the map; doubled until there is a point a cell on average
-    /// and the map is not too large.
+    /// Edge of a cell of the canopy on the map; doubled until there are 1.5 points a cell on
+    /// average and the map is not too large.
     #[schemars(range(min = 0.05, max = 20.0), extend("x-unit" = "m"))]
     pub cell_m: f64,
     /// Widest gap in the points across which the terrain is drawn.
@@ -36,7 +36,7 @@ pub struct Params {
 
 impl Default for Params {
     fn default() -> Self {
-        Self { cell_m: 0.5, gap_m: 30.0, crowns: true }
+        Self { cell_m: 0.25, gap_m: 30.0, crowns: true }
     }
 }
 
@@ -49,7 +49,7 @@ pub struct MapStage;
 const NAME: &str = "map";
 
 /// Points that a cell of the canopy should have on average.
-const POINTS_A_CELL: f64 = 1.0;
+const POINTS_A_CELL: f64 = 1.5;
 /// Cells around an empty one that are looked at to fill it.
 const FILL_CELLS: u32 = 2;
 
@@ -332,6 +332,9 @@ impl Layers {
 
 /// The name of a CRS: by its EPSG code where it is known only by that.
 fn crs_name(crs: &Crs) -> String {
+    if crs.is_unknown() {
+        return "coordinate system unknown".to_owned();
+    }
     let bare = |code: &u32| crs.name == format!("EPSG:{code}");
     let defined = || crs_definitions::from_code(u16::try_from(crs.epsg.filter(bare)?).ok()?);
     let name = defined().and_then(|definition| definition.wkt.split('"').nth(1));
@@ -353,6 +356,7 @@ mod tests {
         let crs = |name: &str| Crs { epsg: Some(3005), name: name.to_owned(), ..Crs::default() };
         assert_eq!(crs_name(&crs("EPSG:3005")), "NAD83 / BC Albers (EPSG:3005)");
         assert_eq!(crs_name(&crs("my own")), "my own");
+        assert_eq!(crs_name(&Crs::default()), "coordinate system unknown");
     }
 
     #[test]
