@@ -1,6 +1,8 @@
 //! Parameters of the two stages.
 
-use crate::quadtree::Division;
+use crate::nodes::edge_m;
+use crate::quadtree::{BLEND_MARGIN, Division};
+use crate::surface::BUCKET_M;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,28 +45,41 @@ pub struct GroundParams {
     /// Where ground points come from.
     pub source: Source,
     /// Which returns may be ground.
+    #[schemars(extend("x-source" = "Axelsson 2000"))]
     pub returns: Returns,
-    /// Edge of the world-fixed blocks that are classified one by one.
+    /// Edge of the world-fixed blocks that are classified one by one, in whole metres.
+    #[schemars(range(min = 16.0, max = 512.0), extend("x-unit" = "m"))]
     pub block_m: f64,
-    /// How far beyond a block points are considered.
+    /// How far beyond a block points are considered, in whole metres.
+    #[schemars(range(min = 4.0, max = 256.0), extend("x-unit" = "m"))]
     pub buffer_m: f64,
-    /// Edge of the cells whose lowest points are the first ground.
+    /// Edge of the cells whose lowest points are the first ground; wider than any building or
+    /// stretch of canopy without a return from the ground.
+    #[schemars(range(min = 2.0, max = 256.0), extend("x-unit" = "m", "x-source" = "Axelsson 2000"))]
     pub seed_cell_m: f64,
-    /// Largest distance from a triangle at the coarsest level.
+    /// Largest distance from a triangle of the coarsest triangulation.
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "form: Axelsson 2000; value: measured on steep forest"))]
     pub coarse_distance_m: f64,
-    /// Largest distance from a triangle at the finest level.
+    /// Largest distance from a triangle of the finest triangulation.
+    #[schemars(range(min = 0.01, max = 5.0), extend("x-unit" = "m", "x-source" = "form: Axelsson 2000; value: measured on steep forest"))]
     pub fine_distance_m: f64,
-    /// Largest angle at the coarsest level.
+    /// Largest angle to a triangle's corner in the coarsest triangulation.
+    #[schemars(range(min = 1.0, max = 89.0), extend("x-unit" = "deg", "x-source" = "form: Axelsson 2000; value: measured on steep forest"))]
     pub coarse_angle_deg: f64,
-    /// Largest angle at the finest level.
+    /// Largest angle to a triangle's corner in the finest triangulation.
+    #[schemars(range(min = 1.0, max = 89.0), extend("x-unit" = "deg", "x-source" = "form: Axelsson 2000; value: measured on steep forest"))]
     pub fine_angle_deg: f64,
-    /// Slope to all neighbours above which a ground vertex is taken back.
+    /// Slope against the plane of all neighbours above which a ground vertex is taken back.
+    #[schemars(range(min = 5.0, max = 89.0), extend("x-unit" = "deg", "x-source" = "measured on steep forest"))]
     pub spike_deg: f64,
-    /// Height above the neighbours' plane from which a vertex is trimmed at the end.
+    /// Height above the plane of the neighbours from which a vertex is trimmed as low vegetation.
+    #[schemars(range(min = 0.0, max = 5.0), extend("x-unit" = "m", "x-source" = "measured on real scans"))]
     pub trim_m: f64,
     /// What is added to it per metre of distance of the neighbours.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "m/m", "x-source" = "measured on real scans"))]
     pub trim_slope: f64,
-    /// Distance from the final triangulation within which points are ground.
+    /// Distance above the final triangulation within which points are ground; twice that below it.
+    #[schemars(range(min = 0.001, max = 1.0), extend("x-unit" = "m", "x-source" = "ranging noise of airborne scanners"))]
     pub tolerance_m: f64,
 }
 
@@ -88,6 +103,32 @@ impl Default for GroundParams {
     }
 }
 
+impl GroundParams {
+    /// What is wrong across fields, one sentence each; empty when nothing is.
+    #[must_use]
+    pub fn check(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        for (name, value) in [("block_m", self.block_m), ("buffer_m", self.buffer_m)] {
+            if !(value >= 1.0 && value.fract() == 0.0) {
+                wrong.push(format!("`{name}` is {value}, must be whole metres, at least 1"));
+            }
+        }
+        if self.fine_distance_m > self.coarse_distance_m {
+            wrong.push(format!(
+                "`fine_distance_m` is {}, above `coarse_distance_m` of {}",
+                self.fine_distance_m, self.coarse_distance_m
+            ));
+        }
+        wrong
+    }
+
+    /// How far beyond any rectangle points decide about its points, metres.
+    #[must_use]
+    pub fn reach_m(&self) -> f64 {
+        self.block_m + self.buffer_m
+    }
+}
+
 /// Parameters of the terrain model.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -95,29 +136,34 @@ pub struct DtmParams {
     /// How the kernel is set.
     #[schemars(extend("x-source" = "Rippa 1999"))]
     pub tuning: Tuning,
-    /// Kernel offset D where `tuning` is `given`.
+    /// Kernel offset D where `tuning` is `given`; 0 is the cone of Tittmann et al. 2011.
     #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "Hardy 1971"))]
     pub offset_m: f64,
     /// Smoothing λ where `tuning` is `given`; 0 passes through every ground point.
     #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "Hardy 1971"))]
     pub smoothing_m: f64,
-    /// Where `tuning` is `auto`: how many points' worth of belief the usual kernel starts with.
-    #[schemars(range(min = 0.0, max = 10_000.0), extend("x-unit" = "points", "x-source" = "measured"))]
+    /// Where `tuning` is `auto`: how strongly the kernel that is best on average is preferred, in
+    /// units of twice the log-likelihood per step between candidates.
+    #[schemars(range(min = 0.0, max = 10_000.0), extend("x-source" = "measured by cross-validation on real scans"))]
     pub prior_weight: f64,
-    /// Ground points above which a patch is divided into four.
-    #[schemars(range(min = 24, max = 1000), extend("x-unit" = "points", "x-source" = "measured"))]
-    pub most_nodes: usize,
-    /// Edge of the largest patches, as a power of two.
-    #[schemars(range(min = 2, max = 7), extend("x-unit" = "log2 m", "x-source" = "measured"))]
-    pub log2_root: i32,
-    /// Ground points closer together than this become one node at their mean.
-    #[schemars(range(min = 0.0, max = 5.0), extend("x-unit" = "m", "x-source" = "measured"))]
+    /// Ground points in the neighbourhood of a patch above which it is divided into four.
+    #[schemars(range(min = 24, max = 1000), extend("x-unit" = "points", "x-source" = "measured by cross-validation on real scans"))]
+    pub most_nodes: u32,
+    /// Edge of the largest patches, a power of two.
+    #[schemars(range(min = 4.0, max = 128.0), extend("x-unit" = "m", "x-source" = "measured by cross-validation on real scans"))]
+    pub largest_patch_m: f64,
+    /// Ground points in one world-fixed square of this edge become one node at their mean; 0 merges
+    /// only points of equal x and y.
+    #[schemars(range(min = 0.0, max = 5.0), extend("x-unit" = "m"))]
     pub merge_m: f64,
+    /// Distance from ground points beyond which there is no terrain (in squares of 2 m).
+    #[schemars(range(min = 1.0, max = 128.0), extend("x-unit" = "m"))]
+    pub max_distance_m: f64,
     /// Edge of the raster's cells.
-    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "convention"))]
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m"))]
     pub cell_m: f64,
     /// How far from the nearest point of any class the raster goes on.
-    #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "convention"))]
+    #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m"))]
     pub rim_m: f64,
 }
 
@@ -127,34 +173,86 @@ impl Default for DtmParams {
             tuning: Tuning::Auto,
             offset_m: 0.5,
             smoothing_m: 0.03,
-            prior_weight: 10.0,
+            prior_weight: 40.0,
             most_nodes: 120,
-            log2_root: 4,
+            largest_patch_m: 16.0,
             merge_m: 0.1,
+            max_distance_m: 30.0,
             cell_m: 0.5,
             rim_m: 5.0,
         }
     }
 }
 
+/// log2 of the edge of the smallest patches: 0.5 m, half of which is a run of the world's curve.
+const LOG2_SMALLEST: i32 = -1;
+
 impl DtmParams {
+    /// What is wrong across fields, one sentence each; empty when nothing is.
+    #[must_use]
+    pub fn check(&self) -> Vec<String> {
+        let mut wrong = Vec::new();
+        if edge_m(self.log2_root()) != self.largest_patch_m {
+            wrong.push(format!(
+                "`largest_patch_m` is {}, must be a power of two",
+                self.largest_patch_m
+            ));
+        }
+        if self.max_distance_m > self.gather_m() {
+            wrong.push(format!(
+                "`max_distance_m` is {}, above {} m, the farthest a patch looks for ground with \
+                 `largest_patch_m` of {}",
+                self.max_distance_m,
+                self.gather_m(),
+                self.largest_patch_m
+            ));
+        }
+        wrong
+    }
+
     /// The rule by which squares are divided.
     #[must_use]
     pub fn division(&self) -> Division {
-        Division { log2_root: self.log2_root, log2_smallest: -1, most_nodes: self.most_nodes }
+        let most_nodes = self.most_nodes as usize;
+        Division { log2_root: self.log2_root(), log2_smallest: LOG2_SMALLEST, most_nodes }
     }
 
-    /// How far beyond a square its patch may look for nodes, metres.
+    /// How far beyond its square a patch may look for nodes, metres.
     #[must_use]
     pub fn gather_m(&self) -> f64 {
-        2.0 * crate::nodes::edge_m(self.log2_root)
+        2.0 * self.largest_patch_m
     }
 
     /// How far beyond a rectangle ground points have a say in the surface over it, metres: the
-    /// largest square whose weight reaches in, the squares around it that have a say in its kernel,
-    /// and how far these look for nodes.
+    /// bucket, the largest square whose weight reaches in, and how far that looks for nodes (the squares around
+    /// it that have a say in its kernel look less far).
     #[must_use]
     pub fn reach_m(&self) -> f64 {
-        2.0 * crate::nodes::edge_m(self.log2_root) + self.gather_m()
+        BUCKET_M + (BLEND_MARGIN + 1.0) * self.largest_patch_m + self.gather_m()
+    }
+
+    fn log2_root(&self) -> i32 {
+        libm::log2(self.largest_patch_m).round() as i32
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn defaults_are_sound() {
+        assert_eq!(GroundParams::default().check(), Vec::<String>::new());
+        assert_eq!(DtmParams::default().check(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn faults_are_named_with_their_value() {
+        let ground = GroundParams { block_m: 10.5, fine_distance_m: 9.0, ..Default::default() };
+        let wrong = ground.check().join("; ");
+        assert!(wrong.contains("`block_m` is 10.5") && wrong.contains("`fine_distance_m` is 9"));
+        let dtm = DtmParams { largest_patch_m: 12.0, max_distance_m: 90.0, ..Default::default() };
+        let wrong = dtm.check().join("; ");
+        assert!(wrong.contains("`largest_patch_m` is 12") && wrong.contains("is 90, above 24 m"));
     }
 }

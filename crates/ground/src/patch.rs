@@ -4,6 +4,7 @@ use crate::Error;
 use crate::hardy::{Hardy, Kernel, Sample, Trend};
 use crate::nodes::{Cell, Nodes};
 use crate::quadtree::{SUPPORT_MARGIN, weight};
+use std::collections::BTreeSet;
 use timberline_pointcloud::frame::TICKS_PER_M;
 
 /// The nodes of a patch in its own frame: the centre of the square, a whole-metre elevation.
@@ -23,15 +24,20 @@ pub struct PatchNodes {
 
 impl PatchNodes {
     /// Gathers the nodes of a square's neighbourhood. Where it holds fewer than `least`, the
-    /// neighbourhood is widened by the square's edge at a time, up to `reach_m` beyond the square.
+    /// neighbourhood is widened by half the square's edge at a time, up to `reach_m` beyond the
+    /// square, and thinned there: a lone square beside dense ground must not collect all of it.
     #[must_use]
     pub fn gather(nodes: &Nodes, cell: Cell, least: usize, reach_m: f64) -> Self {
-        let mut margin = SUPPORT_MARGIN * cell.edge_m();
+        let near_m = SUPPORT_MARGIN * cell.edge_m();
+        let mut margin = near_m;
         loop {
             let mut found = Vec::new();
             nodes.around(cell, margin, |index| found.push(index));
             let wider = margin + 0.5 * cell.edge_m();
             if found.len() >= least || wider > reach_m {
+                if margin > near_m && found.len() > least {
+                    found = thinned(nodes, cell, near_m, &found);
+                }
                 return Self::of(nodes, cell, &found, margin);
             }
             margin = wider;
@@ -88,6 +94,34 @@ fn spacing(x: &[f64], y: &[f64], edge_m: f64, margin_m: f64) -> f64 {
     (area / x.len().max(1) as f64).sqrt()
 }
 
+/// Squares to an edge of a patch in which one far node is enough.
+const FAR_SQUARES: i64 = 8;
+/// So many far nodes are enough: a few rows of those squares.
+const MOST_FAR_NODES: usize = 64;
+
+/// All nodes within the usual neighbourhood (the surface must pass through them), and of those
+/// beyond it one per world-fixed square, the nearest to the patch first.
+fn thinned(nodes: &Nodes, cell: Cell, near_m: f64, found: &[usize]) -> Vec<usize> {
+    let mut kept = Vec::new();
+    nodes.around(cell, near_m, |index| kept.push(index));
+    let square = ((TICKS_PER_M * cell.edge_m()) as i64 / FAR_SQUARES).max(1);
+    let centre = cell.centre();
+    let mut seen = BTreeSet::new();
+    let mut far: Vec<(f64, usize)> = Vec::new();
+    for &index in found.iter().filter(|index| !kept.contains(index)) {
+        let [x, y, _] = nodes.ticks(index);
+        if seen.insert([x.div_euclid(square), y.div_euclid(square)]) {
+            let [x, y, _] = nodes.world(index);
+            let (dx, dy) = (x - centre[0], y - centre[1]);
+            far.push((dx * dx + dy * dy, index));
+        }
+    }
+    far.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+    kept.extend(far.into_iter().take(MOST_FAR_NODES).map(|(_, index)| index));
+    kept.sort_unstable();
+    kept
+}
+
 /// A fitted patch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Patch {
@@ -116,5 +150,29 @@ impl Patch {
         let (dx, dy) = (world[0] - centre[0], world[1] - centre[1]);
         let weight = weight(self.cell.edge_m(), dx, dy);
         (weight > 0.0).then(|| (weight, self.datum_m + self.surface.at(dx, dy)))
+    }
+
+    /// Whether a node lies within a distance of a world position.
+    #[must_use]
+    pub fn has_node(&self, world: [f64; 2], distance_m: f64) -> bool {
+        let centre = self.cell.centre();
+        let (x, y) = (world[0] - centre[0], world[1] - centre[1]);
+        self.surface.x.iter().zip(&self.surface.y).any(|(node_x, node_y)| {
+            let (dx, dy) = (node_x - x, node_y - y);
+            dx * dx + dy * dy <= distance_m * distance_m
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_lone_square_beside_dense_ground_stays_small() {
+        let place = |i: i32| [20.0 + f64::from(i % 200) * 0.15, f64::from(i / 200) * 0.15, 1.0];
+        let nodes = Nodes::new((0..20_000).map(place), 0.0);
+        let gathered = PatchNodes::gather(&nodes, Cell::at(4, [-1.0, 1.0]), 16, 32.0);
+        assert!((1..=16 + MOST_FAR_NODES).contains(&gathered.len()), "{}", gathered.len());
     }
 }

@@ -1,7 +1,7 @@
 //! The stages `ground` (a tile's points to its ground points) and `dtm` (ground points to the terrain
 //! model and heights above ground).
 
-use crate::classify::{Label, classify};
+use crate::classify::{Label, classify, region_of};
 use crate::coverage::covered;
 use crate::nodes::Cell;
 use crate::patch::Patch;
@@ -10,7 +10,8 @@ use timberline_artefact::kinds::{GroundModel, GroundPoints, HardyPatch, Heights,
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
-use timberline_artefact::{Aligned, Kind, Raster, Surroundings, UnitKind, gather};
+use timberline_artefact::{Aligned, Kind, Raster, Surroundings, UnitKind, gather, read_header};
+use timberline_pointcloud::Rect;
 
 /// Ground classification as a stage of a pipeline.
 #[derive(Debug, Clone, Copy)]
@@ -24,8 +25,17 @@ const GROUND_INPUTS: &[InputSpec] = &[InputSpec::halo(PointTile::NAME)];
 const DTM_INPUTS: &[InputSpec] =
     &[InputSpec::halo(PointTile::NAME), InputSpec::halo(GroundPoints::NAME)];
 
-impl Params for GroundParams {}
-impl Params for DtmParams {}
+impl Params for GroundParams {
+    fn check(&self) -> Vec<String> {
+        Self::check(self)
+    }
+}
+
+impl Params for DtmParams {
+    fn check(&self) -> Vec<String> {
+        Self::check(self)
+    }
+}
 
 impl Stage for GroundStage {
     type Params = GroundParams;
@@ -42,7 +52,7 @@ impl Stage for GroundStage {
     }
 
     fn halo_m(params: &GroundParams) -> f64 {
-        params.block_m + params.buffer_m
+        params.reach_m()
     }
 
     fn run(
@@ -50,7 +60,7 @@ impl Stage for GroundStage {
         inputs: &Inputs,
         context: &Context<'_>,
     ) -> Result<(), StageError> {
-        let all = gather(inputs, Self::halo_m(params), &[])?;
+        let all = gather(inputs, reach_m(inputs, params)?, &[])?;
         context.check_cancelled()?;
         let labels = all.own_values(&classify(&all.cloud, all.tile_rect, params)?);
         let ground: Vec<u32> =
@@ -62,10 +72,24 @@ impl Stage for GroundStage {
             .count("points", all.own_len)
             .count("ground", ground.len())
             .count("ground-supplied", supplied);
+        if ground.is_empty() && all.own_len > 0 {
+            context.warn(format!("tile {}", all.tile), "no ground point found");
+        }
         context.advance(all.own_len as u64);
         context.emit(&GroundPoints { ground, supplied: supplied as u64 }, facts)?;
         Ok(())
     }
+}
+
+/// How far beyond the unit's tile the points that decide about it lie: not more than the buffer where
+/// the tile consists of whole blocks.
+fn reach_m(inputs: &Inputs, params: &GroundParams) -> Result<f64, timberline_artefact::Error> {
+    let (header, tile) = (read_header(inputs.own_path(PointTile::NAME)?)?, inputs.tile()?);
+    let Some(grid) = header.facts.grid else { return Ok(params.reach_m()) };
+    let rect = grid.rect(tile);
+    let region = region_of(rect, params);
+    let beyond = |a: usize| (rect.min[a] - region.min[a]).max(region.max[a] - rect.max[a]);
+    Ok(beyond(0).max(beyond(1)).min(params.reach_m()))
 }
 
 impl Stage for DtmStage {
@@ -105,12 +129,12 @@ impl Stage for DtmStage {
 
 /// Heights of the tile's own points, in the tile's order.
 fn heights(all: &Surroundings, surface: &Surface) -> Vec<f32> {
+    let own: Vec<(usize, u32)> =
+        all.own.iter().enumerate().filter_map(|(i, own)| own.map(|own| (i, own))).collect();
+    let world: Vec<[f64; 3]> = own.iter().map(|(i, _)| all.cloud.world(*i)).collect();
     let mut heights = vec![f32::NAN; all.own_len];
-    for (index, own) in all.own.iter().enumerate() {
-        if let Some(own) = own {
-            let [x, y, z] = all.cloud.world(index);
-            heights[*own as usize] = (z - surface.at([x, y])) as f32;
-        }
+    for ((_, own), height) in own.iter().zip(surface.heights(&world)) {
+        heights[*own as usize] = height as f32;
     }
     heights
 }
@@ -122,13 +146,12 @@ fn raster(all: &Surroundings, params: &DtmParams, surface: &Surface) -> Raster {
     let size = [raster.columns as usize, raster.rows as usize];
     let world = (0..all.cloud.len()).map(|i| all.cloud.world(i));
     let covered = covered(world, first, size, params.cell_m, params.rim_m);
-    for row in 0..raster.rows {
-        for column in 0..raster.columns {
-            let index = raster.index(column, row);
-            if covered[index] {
-                raster.values[index] = surface.at(raster.centre(column, row));
-            }
-        }
+    let columns = raster.columns.max(1);
+    let near: Vec<usize> = (0..raster.values.len()).filter(|i| covered[*i]).collect();
+    let centre = |&i: &usize| raster.centre(i as u32 % columns, i as u32 / columns);
+    let centres: Vec<[f64; 2]> = near.iter().map(centre).collect();
+    for (index, elevation) in near.into_iter().zip(surface.elevations(&centres)) {
+        raster.values[index] = elevation;
     }
     raster
 }
@@ -147,9 +170,10 @@ fn wire(patch: &Patch) -> HardyPatch {
     }
 }
 
-/// The surface of a stored model, for positions in a world rectangle.
+/// The surface of a stored model, for positions in a world rectangle within its tile;
+/// `max_distance_m` as in the parameters that made it.
 #[must_use]
-pub fn surface_of(model: &GroundModel, rect: timberline_pointcloud::Rect) -> Surface {
+pub fn surface_of(model: &GroundModel, rect: Rect, max_distance_m: f64) -> Surface {
     let patches = model.patches.iter().map(|stored| {
         let log2_edge = libm::log2(stored.edge_m).round() as i32;
         Patch {
@@ -164,5 +188,5 @@ pub fn surface_of(model: &GroundModel, rect: timberline_pointcloud::Rect) -> Sur
             },
         }
     });
-    Surface::from_patches(patches.collect(), rect)
+    Surface::from_patches(patches.collect(), rect, max_distance_m)
 }

@@ -16,7 +16,7 @@ use std::collections::BTreeMap;
 use timberline_pointcloud::Rect;
 
 /// Edge of the buckets that list the patches with weight in them, metres.
-const BUCKET_M: f64 = 2.0;
+pub(crate) const BUCKET_M: f64 = 2.0;
 
 /// A terrain surface over a world rectangle.
 #[derive(Debug, Clone)]
@@ -33,7 +33,7 @@ impl Surface {
     /// [`Error::Singular`] or [`Error::Eigen`] where a system cannot be solved.
     pub fn build(nodes: &Nodes, rect: Rect, params: &DtmParams) -> Result<Self, Error> {
         let division = params.division();
-        let leaves = division.leaves_over(nodes, rect);
+        let leaves = division.leaves_over(nodes, whole_buckets(rect));
         let ratios = match params.tuning {
             Tuning::Auto => tuned(nodes, &leaves, &division, params)?,
             Tuning::Given => BTreeMap::new(),
@@ -52,13 +52,16 @@ impl Surface {
                 Patch::fit(*leaf, &gathered, kernel).map(Some)
             })
             .collect();
-        Ok(Self::from_patches(fitted?.into_iter().flatten().collect(), rect))
+        let patches = fitted?.into_iter().flatten().collect();
+        Ok(Self::from_patches(patches, rect, params.max_distance_m))
     }
 
-    /// A surface from fitted patches (as read back), for positions in a world rectangle.
+    /// A surface from fitted patches (as read back), for positions in a world rectangle. There is
+    /// no surface in the world-fixed squares of 2 m whose centre is farther than `max_distance_m`
+    /// from every node of the patches with weight there.
     #[must_use]
-    pub fn from_patches(patches: Vec<Patch>, rect: Rect) -> Self {
-        let buckets = Buckets::new(&patches, rect);
+    pub fn from_patches(patches: Vec<Patch>, rect: Rect, max_distance_m: f64) -> Self {
+        let buckets = Buckets::new(&patches, rect, max_distance_m);
         Self { patches, buckets }
     }
 
@@ -66,6 +69,19 @@ impl Surface {
     #[must_use]
     pub fn patches(&self) -> &[Patch] {
         &self.patches
+    }
+
+    /// World elevations at world positions, as [`Surface::at`], in parallel and in their order.
+    #[must_use]
+    pub fn elevations(&self, world: &[[f64; 2]]) -> Vec<f64> {
+        world.par_iter().with_min_len(GRAIN).map(|p| self.at(*p)).collect()
+    }
+
+    /// Heights of world positions above the surface, metres, in their order; NaN without one.
+    #[must_use]
+    pub fn heights(&self, world: &[[f64; 3]]) -> Vec<f64> {
+        let height = |p: &[f64; 3]| p[2] - self.at([p[0], p[1]]);
+        world.par_iter().with_min_len(GRAIN).map(height).collect()
     }
 
     /// World elevation at a world position of the rectangle, metres; NaN where no patch reaches.
@@ -82,10 +98,19 @@ impl Surface {
     }
 }
 
+/// Evaluations that one thread does at a time.
+const GRAIN: usize = 1024;
 /// A patch with fewer nodes looks further afield: a plane's three, and some redundancy.
 const LEAST_NODES: usize = 16;
 /// Patches of a root square that are scored when kernels are chosen.
 const SCORED_PATCHES: usize = 4;
+
+/// The rectangle grown to whole buckets, so that all patches with weight in a bucket are known.
+fn whole_buckets(rect: Rect) -> Rect {
+    let min = rect.min.map(|v| (v / BUCKET_M).floor() * BUCKET_M);
+    let max = rect.max.map(|v| (v / BUCKET_M).floor() * BUCKET_M + BUCKET_M);
+    Rect { min, max }
+}
 
 fn root_of(leaf: Cell, division: &Division) -> Cell {
     let shift = division.log2_root - leaf.log2_edge;
@@ -151,7 +176,7 @@ struct Buckets {
 }
 
 impl Buckets {
-    fn new(patches: &[Patch], rect: Rect) -> Self {
+    fn new(patches: &[Patch], rect: Rect, max_distance_m: f64) -> Self {
         let index = |v: f64| (v / BUCKET_M).floor() as i64;
         let low = rect.min.map(index);
         let high = rect.max.map(index);
@@ -169,6 +194,19 @@ impl Buckets {
             }
         }
         entries.sort_unstable();
+        let centre = |bucket: u32| {
+            let place = [i64::from(bucket) % columns as i64, i64::from(bucket) / columns as i64];
+            [0, 1].map(|a| ((low[a] + place[a]) as f64 + 0.5) * BUCKET_M)
+        };
+        let entries: Vec<(u32, u32)> = entries
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter(|run| {
+                let at = centre(run[0].0);
+                run.iter().any(|(_, patch)| patches[*patch as usize].has_node(at, max_distance_m))
+            })
+            .flatten()
+            .copied()
+            .collect();
         let mut starts = vec![0u32; columns * rows + 1];
         entries.iter().for_each(|(bucket, _)| starts[*bucket as usize + 1] += 1);
         (1..starts.len()).for_each(|i| starts[i] += starts[i - 1]);

@@ -122,6 +122,17 @@ fn lab() {
         let dtm: Vec<f64> = supplier.iter().map(|p| surface.at([p[0], p[1]]) - p[2]).collect();
         let t2 = t.elapsed().as_secs_f64() - build;
         let mean = |v: &[f64]| v.iter().sum::<f64>() / v.len() as f64;
+        let mut worst: Vec<usize> = (0..supplier.len()).collect();
+        worst.sort_by(|a, b| dtm[*b].abs().total_cmp(&dtm[*a].abs()));
+        for i in worst.iter().take(6) {
+            println!(
+                "   worst {:.2} at {:.1} {:.1} z {:.2}",
+                dtm[*i],
+                supplier[*i][0] - rect.min[0],
+                supplier[*i][1] - rect.min[1],
+                supplier[*i][2]
+            );
+        }
         println!(
             "{name:28} tin {:.3} dtm {:.3} (bias {:.3}, max {:.2}) indep {:.3} omis {:.3} comm {:.3} over rms {:.3} bias {:.3} >1m {:.3} | {} ground, {time:.1} s; build {build:.1} s, {:.2} us/eval",
             rms(&at_supplier).0,
