@@ -8,7 +8,7 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Edge of the lattice, metres: data in cells that touch, also at a corner, are one site; so data
 /// closer than this always are, data further apart than three times this never.
-pub const LATTICE_M: f64 = 512.0;
+pub const LATTICE_M: f64 = 128.0;
 
 /// Collects where points are.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -88,9 +88,9 @@ mod tests {
     #[test]
     fn near_is_one_and_far_is_two() {
         let found =
-            footprint(&[[10.0, 10.0], [500.0, 700.0], [-100.0, 5.0], [5000.0, 3.0]]).sites();
+            footprint(&[[10.0, 10.0], [120.0, 200.0], [-100.0, 5.0], [5000.0, 3.0]]).sites();
         assert_eq!(found.len(), 2);
-        assert_eq!(found[0], Rect { min: [-100.0, 5.0], max: [500.0, 700.0] });
+        assert_eq!(found[0], Rect { min: [-100.0, 5.0], max: [120.0, 200.0] });
         assert_eq!(found[1], Rect { min: [5000.0, 3.0], max: [5000.0, 3.0] });
     }
 

@@ -98,7 +98,8 @@ impl<'a> Figure<'a> {
         let longest = (longest_m / page.detail_m * 2.0).clamp(SHORTEST_PX, LONGEST_PX);
         let px_per_m = longest / longest_m;
         let (width, height) = ((width_m * px_per_m).ceil(), (height_m * px_per_m).ceil());
-        let unit = (longest / 60.0).max(22.0).round();
+        // Text in proportion to the map's area: narrow maps are not crowded by it.
+        let unit = ((width * height).sqrt() / 58.0).max(22.0).round();
         let (left, top) = (6.2 * unit, 4.6 * unit);
         let page_width = left + width.max(14.0 * unit) + LEGEND_WIDTH * unit;
         let page_height = top + height.max(LEGEND_HEIGHT * unit) + 3.0 * unit;

@@ -17,7 +17,9 @@ const SAME_CROWN_M: f64 = 3.0;
 /// Light on level ground is brought to this.
 const LEVEL_LIGHT: f64 = 0.88;
 /// Crowns narrower than this many pixels have no outline.
-const NARROWEST_CROWN_PX: f64 = 7.0;
+const NARROWEST_CROWN_PX: f64 = 8.0;
+/// Width of a crown's outline, metres, within what can be drawn.
+const OUTLINE_M: f64 = 0.22;
 
 /// A tree on the map.
 #[derive(Debug, Clone, PartialEq)]
@@ -135,11 +137,11 @@ fn pixel(at: [f64; 2], canopy: &Grid, light: &Light, top: f64) -> Rgb {
 }
 
 fn draw_crowns(figure: &mut Figure<'_>, trees: &[MapTree]) {
-    let width = (figure.unit() / 14.0).max(1.2);
+    let width = (OUTLINE_M * figure.px_per_m()).clamp(0.7, figure.unit() / 14.0);
     for tree in trees {
         let corners: Vec<[f64; 2]> = tree.crown_m.iter().map(|corner| figure.px(*corner)).collect();
         if extent_px(&corners) >= NARROWEST_CROWN_PX {
-            figure.canvas.outline(&corners, width + 1.2, Paint::sheer(INK, 0.22));
+            figure.canvas.outline(&corners, width + 0.8, Paint::sheer(INK, 0.22));
             figure.canvas.outline(&corners, width, Paint::sheer(PAPER, 0.6));
         }
     }
