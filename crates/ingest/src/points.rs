@@ -155,8 +155,12 @@ impl PointReader {
         let Mode::Chunks { source, laszip, chunks, next, open } = &mut self.mode else {
             return Ok(());
         };
+        if open.is_some() {
+            self.next_of_open(bytes);
+            return Ok(());
+        }
         let len = self.header.record_len;
-        if open.is_none() && chunks[*next].points > self.batch {
+        if chunks[*next].points > self.batch {
             let chunk = chunks[*next];
             match open_chunk(source.as_mut(), laszip, chunk, len)? {
                 Ok(opened) => *open = Some(opened),
@@ -165,39 +169,38 @@ impl PointReader {
             *next += 1;
             return Ok(());
         }
-        if let Some(opened) = open {
-            let count = opened.left.min(self.batch);
-            bytes.resize(count as usize * usize::from(len), 0);
-            let done = decompress(&mut opened.input, bytes, len);
-            opened.left -= count;
-            if let Some(problem) = done.problem {
-                let chunk = chunks[*next - 1];
-                let read = chunk.points - opened.left - (count - done.points);
-                self.damages.push(damage(*next - 1, chunk, read, problem));
-                opened.left = 0;
-            }
-            bytes.truncate(done.points as usize * usize::from(len));
-            if opened.left == 0 {
-                *open = None;
-            }
-            return Ok(());
-        }
         let group = group(&chunks[*next..], self.batch);
         let results = decompress_all(source.as_mut(), laszip, group, len, bytes)?;
-        let mut kept = 0;
-        let mut from = 0;
+        let runs = group.iter().zip(&results).map(|(chunk, done)| (chunk.points, done.points));
+        keep_good(bytes, runs, usize::from(len));
         for (index, (chunk, done)) in group.iter().zip(results).enumerate() {
-            let good = done.points as usize * usize::from(len);
-            bytes.copy_within(from..from + good, kept);
-            kept += good;
-            from += chunk.points as usize * usize::from(len);
             if let Some(problem) = done.problem {
                 self.damages.push(damage(*next + index, *chunk, done.points, problem));
             }
         }
-        bytes.truncate(kept);
         *next += group.len();
         Ok(())
+    }
+
+    /// Goes on with a chunk larger than a batch.
+    fn next_of_open(&mut self, bytes: &mut Vec<u8>) {
+        let Mode::Chunks { chunks, next, open, .. } = &mut self.mode else { return };
+        let Some(opened) = open else { return };
+        let len = self.header.record_len;
+        let count = opened.left.min(self.batch);
+        bytes.resize(count as usize * usize::from(len), 0);
+        let done = decompress(&mut opened.input, bytes, len);
+        bytes.truncate(done.points as usize * usize::from(len));
+        opened.left -= count;
+        if let Some(problem) = done.problem {
+            let chunk = chunks[*next - 1];
+            let read = chunk.points - opened.left - (count - done.points);
+            self.damages.push(damage(*next - 1, chunk, read, problem));
+            opened.left = 0;
+        }
+        if opened.left == 0 {
+            *open = None;
+        }
     }
 
     fn next_of_stream(&mut self, bytes: &mut Vec<u8>) {
@@ -230,6 +233,18 @@ fn damage(index: usize, chunk: Chunk, read: u64, problem: String) -> Damage {
         problem,
         lost: chunk.points - read,
     }
+}
+
+/// Moves what could be read of each run of records (points expected, points read) together.
+fn keep_good(bytes: &mut Vec<u8>, runs: impl Iterator<Item = (u64, u64)>, len: usize) {
+    let (mut from, mut kept) = (0, 0);
+    for (expected, read) in runs {
+        let good = read as usize * len;
+        bytes.copy_within(from..from + good, kept);
+        kept += good;
+        from += expected as usize * len;
+    }
+    bytes.truncate(kept);
 }
 
 /// As many whole chunks as fit a batch, at least one.

@@ -66,9 +66,29 @@ pub fn scatter<W: Write>(
         observed.add(&batch);
         buckets.add(&batch)?;
     }
+    let notes = judge(&file, &observed, outside + file.outside(), params.damaged)?;
+    let (out, index) = buckets.finish(&file, &observed)?;
+    let scattered = Scattered {
+        index,
+        outside: outside + file.outside(),
+        lost: file.damages().iter().map(|damage| damage.lost).sum(),
+        zero_returns: observed.zero_returns,
+        ground: observed.ground,
+        is_normalised: observed.is_normalised(),
+        notes: notes.into_messages(),
+    };
+    Ok((out, scattered))
+}
+
+/// Decides whether what was read will do, and collects what to say about it.
+fn judge(
+    file: &LasFile,
+    observed: &Observed,
+    outside: u64,
+    damaged: Damaged,
+) -> Result<Notes, Error> {
     let mut notes = file.notes().clone();
-    check_damage(&file, params.damaged, &mut notes)?;
-    outside += file.outside();
+    check_damage(file, damaged, &mut notes)?;
     if outside > 0 && observed.points == 0 {
         return Err(Error::Nowhere { points: outside, bounds: file.header().bounds[0] });
     }
@@ -77,19 +97,9 @@ pub fn scatter<W: Write>(
             "{outside} points lie outside of what coordinates can be and are left out"
         ));
     }
-    note_scale(&file, &mut notes);
+    note_scale(file, &mut notes);
     observed.report(&mut notes);
-    let (out, index) = buckets.finish(&file, &observed)?;
-    let scattered = Scattered {
-        index,
-        outside,
-        lost: file.damages().iter().map(|damage| damage.lost).sum(),
-        zero_returns: observed.zero_returns,
-        ground: observed.ground,
-        is_normalised: observed.is_normalised(),
-        notes: notes.into_messages(),
-    };
-    Ok((out, scattered))
+    Ok(notes)
 }
 
 /// The header's bounds in metres.

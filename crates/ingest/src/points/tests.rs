@@ -46,6 +46,27 @@ fn chunks_are_read_side_by_side_in_their_sequence() {
     }
 }
 
+/// One chunk of more than a batch, as some writers make of a whole file.
+#[test]
+fn a_chunk_larger_than_a_batch_is_read_in_parts() {
+    let las = |format: u8, version: (u8, u8)| {
+        let mut las = LasBytes::new(version, format).extra_len(6000);
+        for i in 0..4000 {
+            let record = las.record([i, i * 3, 7 * i]);
+            las = las.push(record);
+        }
+        las
+    };
+    for (format, version) in [(0, (1, 2)), (6, (1, 4))] {
+        let plain = read(las(format, version).build());
+        assert_eq!(plain.0, 4000);
+        let mut file = open(las(format, version).build_laz(50_000)).unwrap();
+        let first = file.next_batch().unwrap().unwrap().len();
+        assert!(first < 4000, "{first}");
+        assert_eq!(read(las(format, version).build_laz(50_000)), plain);
+    }
+}
+
 /// The stream of LASzip 1: the `laz` crate panics on it, "variable-size chunks, but no chunk table".
 #[test]
 fn a_stream_without_chunks_is_read() {
