@@ -54,12 +54,13 @@ fn cross_validated_error() {
     }
 }
 
-/// Errors in discs without any ground point, like those under crowns.
+/// Errors in discs without any ground point, like those under crowns, against the linear
+/// triangulation of the same points (which discs are drawn matters more than the method).
 #[test]
 #[ignore = "needs TIMBERLINE_DATA"]
 fn error_in_removed_discs() {
     let points = Scan::read("lidR/Topography.laz").supplier_ground();
-    for (radius, discs, most) in [(2.5, 400, 0.21), (5.0, 200, 0.24), (10.0, 80, 0.45)] {
+    for (radius, discs, share) in [(2.5, 400, 0.90), (5.0, 200, 0.85), (10.0, 80, 0.80)] {
         let (errors, tin) = disc_errors(&points, radius, discs);
         let ((ours, missing), (linear, _)) = (rms(&errors), rms(&tin));
         println!(
@@ -67,7 +68,7 @@ fn error_in_removed_discs() {
             errors.len()
         );
         assert_eq!(missing, 0);
-        assert!(ours <= most && ours <= linear, "{ours} against {linear}");
+        assert!(ours <= share * linear, "{ours} against {linear}");
     }
 }
 

@@ -5,16 +5,16 @@ use std::path::PathBuf;
 use timberline_pointcloud::frame::quantise;
 
 /// What the tests need of a scan.
-pub struct Scan {
-    pub world: Vec<[f64; 3]>,
-    pub class: Vec<u8>,
-    pub return_number: Vec<u8>,
-    pub number_of_returns: Vec<u8>,
+pub(crate) struct Scan {
+    pub(crate) world: Vec<[f64; 3]>,
+    pub(crate) class: Vec<u8>,
+    pub(crate) return_number: Vec<u8>,
+    pub(crate) number_of_returns: Vec<u8>,
 }
 
 impl Scan {
     /// Reads a file of the `als` folder under `TIMBERLINE_DATA`.
-    pub fn read(name: &str) -> Self {
+    pub(crate) fn read(name: &str) -> Self {
         let root =
             std::env::var("TIMBERLINE_DATA").expect("TIMBERLINE_DATA names the folder of scans");
         let path = PathBuf::from(root).join("als").join(name);
@@ -30,7 +30,7 @@ impl Scan {
     }
 
     /// The supplier's ground points.
-    pub fn supplier_ground(&self) -> Vec<[f64; 3]> {
+    pub(crate) fn supplier_ground(&self) -> Vec<[f64; 3]> {
         self.world
             .iter()
             .zip(&self.class)
@@ -41,7 +41,7 @@ impl Scan {
 }
 
 /// A reproducible number in 0..1 for index `i` (`SplitMix64`).
-pub fn hash01(i: usize) -> f64 {
+pub(crate) fn hash01(i: usize) -> f64 {
     let mut z = (i as u64).wrapping_mul(0x9E37_79B9_7F4A_7C15).wrapping_add(0x9E37_79B9_7F4A_7C15);
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
     z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
@@ -49,7 +49,7 @@ pub fn hash01(i: usize) -> f64 {
 }
 
 /// Root mean square of finite values, and how many are not finite.
-pub fn rms(errors: &[f64]) -> (f64, usize) {
+pub(crate) fn rms(errors: &[f64]) -> (f64, usize) {
     let finite: Vec<f64> = errors.iter().copied().filter(|e| e.is_finite()).collect();
     let mean = finite.iter().map(|e| e * e).sum::<f64>() / finite.len().max(1) as f64;
     (mean.sqrt(), errors.len() - finite.len())
