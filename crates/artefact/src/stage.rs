@@ -223,8 +223,12 @@ impl Inputs {
     }
 
     fn path_of(&self, kind: &str, unit: &UnitId) -> Result<&Path, Error> {
-        let file = self.files.iter().find(|file| file.kind == kind && file.unit == *unit);
-        file.map(|file| file.path.as_path()).ok_or_else(|| self.missing(kind, unit))
+        // `new` has sorted them; a campaign stage looks up every tile of large campaigns.
+        let place = self
+            .files
+            .binary_search_by(|file| (file.kind.as_str(), &file.unit).cmp(&(kind, unit)))
+            .map_err(|_| self.missing(kind, unit))?;
+        Ok(&self.files[place].path)
     }
 
     fn missing(&self, kind: &str, unit: &UnitId) -> Error {
