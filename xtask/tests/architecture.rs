@@ -2,6 +2,14 @@
 //!
 //! `cargo test -p xtask architecture`
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test may fail"
+)]
+
 mod architecture {
     use std::collections::BTreeMap;
     use std::path::{Path, PathBuf};

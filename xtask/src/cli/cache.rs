@@ -101,7 +101,7 @@ fn size(place: &Place, json: bool) -> Result<u8> {
     }
     let mut table = Table::new(&["stage", "files", "size"]);
     rows.iter().for_each(|(stage, files, size)| {
-        table.row([stage.clone(), files.to_string(), bytes(*size)])
+        table.row([stage.clone(), files.to_string(), bytes(*size)]);
     });
     let (files, total) = rows.iter().fold((0, 0), |(n, b), row| (n + row.1, b + row.2));
     table.row(["total".to_owned(), files.to_string(), bytes(total)]);

@@ -89,7 +89,8 @@ fn print(files: &[PathBuf], found: &[(PathBuf, String)], stray: &[PathBuf], fix:
         found.len(),
         stray.len()
     ));
-    if !fix && !(found.is_empty() && stray.is_empty()) {
+    let bad = !found.is_empty() || !stray.is_empty();
+    if bad && !fix {
         out::talk("`doctor --fix` removes them; a run rebuilds what is needed");
     }
 }

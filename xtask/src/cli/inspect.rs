@@ -164,8 +164,8 @@ fn payload<K: Kind + Serialize>(path: &Path) -> Result<Value> {
 
 /// Lists of numbers of one length become the columns of one table, lists of objects tables of their own.
 fn split(value: &Value) -> Vec<(String, Rows)> {
-    let (mut tables, mut columns): (Vec<(String, Rows)>, Vec<(&String, &Vec<Value>)>) =
-        Default::default();
+    let mut tables: Vec<(String, Rows)> = Vec::new();
+    let mut columns: Vec<(&String, &Vec<Value>)> = Vec::new();
     for (name, field) in value.as_object().into_iter().flatten() {
         match field {
             Value::Array(rows) if rows.first().is_some_and(Value::is_object) => {

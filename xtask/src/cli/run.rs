@@ -3,7 +3,7 @@
 use super::open::{Opened, Place};
 use super::out::{self, Table};
 use super::{DONE, LOSSES, Program, Usage};
-use crate::config::{Pipeline, nearest};
+use crate::config::{Pipeline, PipelineStage, nearest};
 use crate::engine::progress::{Progress, Style, bytes, duration, short};
 use crate::engine::runlog::{Outcome, StageSummary};
 use crate::engine::{Limits, Options, Report, Runner, Selection, memory};
@@ -129,7 +129,7 @@ fn selection(args: &Args, pipeline: &Pipeline) -> Result<Selection> {
 /// [`Usage`] with the nearest name.
 pub fn stage_position(pipeline: &Pipeline, name: &str) -> Result<usize> {
     pipeline.position(name).ok_or_else(|| {
-        let names: Vec<&str> = pipeline.stages.iter().map(|stage| stage.name()).collect();
+        let names: Vec<&str> = pipeline.stages.iter().map(PipelineStage::name).collect();
         let near =
             nearest(name, names.iter().copied()).map(|near| format!("; did you mean `{near}`?"));
         let hint = near.unwrap_or_else(|| format!("; its stages are {}", names.join(", ")));

@@ -116,10 +116,10 @@ impl Checker<'_> {
         let schema = resolve(self.root, schema);
         match &node.content {
             Content::Table(entries) if kind(&schema) == "object" => {
-                self.table(name, node, entries, &schema)
+                self.table(name, node, entries, &schema);
             }
             Content::List(items) if kind(&schema) == "array" => {
-                self.list(name, node, items, &schema)
+                self.list(name, node, items, &schema);
             }
             Content::Scalar(value) if fits(value, &schema) => {}
             _ => self.refuse(name, node, &schema),

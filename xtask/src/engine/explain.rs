@@ -7,6 +7,7 @@ use crate::config::{Pipeline, PipelineStage, Place, Source};
 use crate::registry::{CRS, GRID, RAW};
 use serde::Serialize;
 use serde_json::Value;
+use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::Path;
 use timberline_artefact::{Header, InputRef, UnitId, kinds};
@@ -130,7 +131,14 @@ pub struct DryRun<'a> {
     store: &'a Store,
     /// The units of every stage.
     pub stages: Vec<Vec<UnitPlan>>,
+    /// What the store holds of every stage, listed when first asked for.
+    entries: Vec<OnceCell<Entries>>,
+    /// Where the change of a unit of a stage began, for those asked for before.
+    roots: RefCell<BTreeMap<(usize, UnitId), Root>>,
 }
+
+/// Artefacts of a stage by the file stem of their unit.
+type Entries = BTreeMap<String, Vec<Entry>>;
 
 impl<'a> DryRun<'a> {
     /// Plans all stages as if everything that would run had succeeded.
@@ -145,25 +153,25 @@ impl<'a> DryRun<'a> {
             stages.push(plans);
         }
         store.save();
-        Ok(Self { pipeline, store, stages })
+        let entries = stages.iter().map(|_| OnceCell::new()).collect();
+        Ok(Self { pipeline, store, stages, entries, roots: RefCell::default() })
+    }
+
+    fn entries(&self, position: usize) -> &Entries {
+        let list = || self.store.entries(self.pipeline.stages[position].name());
+        self.entries[position].get_or_init(list)
     }
 
     /// Why every unit of a stage that is not up to date would run.
     #[must_use]
     pub fn explain(&self, position: usize) -> Vec<Explained> {
-        let entries = self.store.entries(self.pipeline.stages[position].name());
         let stale = self.stages[position].iter().filter(|plan| !plan.is_whole());
-        stale.map(|plan| self.explain_unit(position, plan, &entries)).collect()
+        stale.map(|plan| self.explain_unit(position, plan)).collect()
     }
 
-    fn explain_unit(
-        &self,
-        position: usize,
-        plan: &UnitPlan,
-        entries: &BTreeMap<String, Vec<Entry>>,
-    ) -> Explained {
+    fn explain_unit(&self, position: usize, plan: &UnitPlan) -> Explained {
         let stage = &self.pipeline.stages[position];
-        let cause = cause(stage, plan, entries);
+        let cause = cause(stage, plan, self.entries(position));
         Explained {
             stage: stage.name().to_owned(),
             unit: plan.unit().clone(),
@@ -186,20 +194,24 @@ impl<'a> DryRun<'a> {
         let inputs = self.pipeline.stages[position].stage.info().inputs;
         let at = inputs.iter().position(|input| input.kind == kind)?;
         let from = self.pipeline.producers(position).get(at).copied().flatten()?;
+        if let Some(known) = self.roots.borrow().get(&(from, unit.clone())) {
+            return Some(known.clone());
+        }
         let plan = self.stages[from].iter().find(|plan| plan.unit() == unit)?;
         let stage = &self.pipeline.stages[from];
-        let entries = self.store.entries(stage.name());
-        let cause = if plan.is_whole() {
-            changed(stage, plan, &entries)?
-        } else {
-            self::cause(stage, plan, &entries)
+        let entries = self.entries(from);
+        let cause = match plan.is_whole() {
+            true => changed(stage, plan, entries)?,
+            false => self::cause(stage, plan, entries),
         };
         let here = || Root {
             stage: stage.name().to_owned(),
             unit: unit.clone(),
             words: words(stage, &self.pipeline.path, &cause),
         };
-        Some(self.root(from, &cause).unwrap_or_else(here))
+        let root = self.root(from, &cause).unwrap_or_else(here);
+        self.roots.borrow_mut().insert((from, unit.clone()), root.clone());
+        Some(root)
     }
 }
 
@@ -214,7 +226,7 @@ fn assumed(plan: &UnitPlan) -> Made {
     Made { key: plan.task.key.clone(), standing, points, parts }
 }
 
-fn cause(stage: &PipelineStage, plan: &UnitPlan, entries: &BTreeMap<String, Vec<Entry>>) -> Cause {
+fn cause(stage: &PipelineStage, plan: &UnitPlan, entries: &Entries) -> Cause {
     if !plan.absent.is_empty() {
         return Cause::Blocked { absent: plan.absent.clone() };
     }
@@ -229,11 +241,7 @@ fn cause(stage: &PipelineStage, plan: &UnitPlan, entries: &BTreeMap<String, Vec<
 }
 
 /// The differences to the artefact on disk that is most like today's unit (the newest of several).
-fn changed(
-    stage: &PipelineStage,
-    plan: &UnitPlan,
-    entries: &BTreeMap<String, Vec<Entry>>,
-) -> Option<Cause> {
+fn changed(stage: &PipelineStage, plan: &UnitPlan, entries: &Entries) -> Option<Cause> {
     let others =
         entries.get(&plan.unit().file_stem())?.iter().filter(|entry| entry.key != plan.task.key);
     let compared = others.filter_map(|entry| {

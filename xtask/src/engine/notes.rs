@@ -52,8 +52,11 @@ fn inode(_: &Metadata) -> u64 {
 #[derive(Debug)]
 pub struct Notes<T> {
     path: PathBuf,
-    entries: Mutex<(BTreeMap<PathBuf, (Stamp, T)>, bool)>,
+    /// The entries, and whether they differ from the file.
+    entries: Mutex<(Entries<T>, bool)>,
 }
+
+type Entries<T> = BTreeMap<PathBuf, (Stamp, T)>;
 
 impl<T: Clone + Serialize + for<'a> Deserialize<'a>> Notes<T> {
     /// Reads the notes; a missing or broken file means there are none.

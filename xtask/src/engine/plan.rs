@@ -91,7 +91,7 @@ pub fn plan_stage(
     store: &Store,
     before: &Progressed,
 ) -> Result<Vec<UnitPlan>, String> {
-    let planner = Planner { pipeline, position, survey, store, before };
+    let planner = Planner::new(pipeline, position, survey, store, before);
     planner.units().into_iter().map(|unit| planner.unit(unit)).collect()
 }
 
@@ -101,15 +101,48 @@ struct Planner<'a> {
     survey: &'a Survey,
     store: &'a Store,
     before: &'a Progressed,
+    halo_m: Result<f64, String>,
+    /// The raw files with points in a tile, for every stage before that works on raw files.
+    by_tile: BTreeMap<usize, BTreeMap<TileId, Vec<Source<'a>>>>,
 }
 
+/// A unit of an earlier stage.
+type Source<'a> = (&'a UnitId, &'a Made);
+
 impl<'a> Planner<'a> {
+    fn new(
+        pipeline: &'a Pipeline,
+        position: usize,
+        survey: &'a Survey,
+        store: &'a Store,
+        before: &'a Progressed,
+    ) -> Self {
+        let stage = &pipeline.stages[position];
+        let halo_m = stage.stage.halo_m(&stage.params);
+        let by_tile = BTreeMap::new();
+        let mut planner = Self { pipeline, position, survey, store, before, halo_m, by_tile };
+        let froms: BTreeSet<usize> = planner.inputs().map(|(_, from)| from).collect();
+        for from in froms {
+            if planner.kind_of(from) != UnitKind::File {
+                continue;
+            }
+            let mut index: BTreeMap<TileId, Vec<Source<'a>>> = BTreeMap::new();
+            for (unit, made) in &before[from] {
+                made.parts
+                    .iter()
+                    .for_each(|part| index.entry(*part).or_default().push((unit, made)));
+            }
+            planner.by_tile.insert(from, index);
+        }
+        planner
+    }
+
     fn stage(&self) -> &'a PipelineStage {
         &self.pipeline.stages[self.position]
     }
 
     /// The inputs with the stage that makes them.
-    fn inputs(&self) -> impl Iterator<Item = (&'static InputSpec, usize)> {
+    fn inputs(&self) -> impl Iterator<Item = (&'static InputSpec, usize)> + use<> {
         let specs = self.stage().stage.info().inputs;
         let producers = self.pipeline.producers(self.position);
         specs.iter().zip(producers).filter_map(|(spec, from)| Some((spec, from?)))
@@ -142,15 +175,17 @@ impl<'a> Planner<'a> {
 
     fn unit(&self, unit: UnitId) -> Result<UnitPlan, String> {
         let (stage, info) = (self.stage(), self.stage().stage.info());
-        let halo_m = stage.stage.halo_m(&stage.params)?;
+        let halo_m = self.halo_m.clone()?;
         let mut draft = Draft::default();
         for (spec, from) in self.inputs() {
             for (of, made) in self.sources(&unit, spec, from, halo_m) {
                 self.take(&mut draft, spec, from, of, made, &unit);
             }
         }
-        let file =
-            self.survey.files.iter().find(|file| unit == UnitId::File(file.raw.name.clone()));
+        let file = match &unit {
+            UnitId::File(name) => self.survey.files.iter().find(|file| file.raw.name == *name),
+            _ => None,
+        };
         if info.unit == UnitKind::File {
             self.take_raw(&mut draft, &unit, file.map(|file| file.hash.clone()));
         }
@@ -182,30 +217,35 @@ impl<'a> Planner<'a> {
         })
     }
 
-    /// The units of an earlier stage that a unit reads.
+    /// The units of an earlier stage that a unit reads, sorted.
     fn sources(
         &self,
         unit: &UnitId,
         spec: &InputSpec,
         from: usize,
         halo_m: f64,
-    ) -> Vec<(&'a UnitId, &'a Made)> {
-        let all = self.before[from].iter();
+    ) -> Vec<Source<'a>> {
+        let all = &self.before[from];
         let Some(tile) = unit.tile().filter(|_| spec.scope != Scope::All) else {
-            let own =
-                |of: &UnitId| *unit == UnitId::Campaign || spec.scope == Scope::All || of == unit;
-            return all.filter(|(of, _)| own(of)).collect();
+            let everything = *unit == UnitId::Campaign || spec.scope == Scope::All;
+            return match everything {
+                true => all.iter().collect(),
+                false => all.get_key_value(unit).into_iter().collect(),
+            };
         };
-        let near: BTreeSet<TileId> = match (spec.scope, self.survey.campaign.grid) {
-            (Scope::Halo, Some(grid)) => grid.neighbours(tile, halo_m).into_iter().collect(),
-            _ => BTreeSet::from([tile]),
+        let near = match (spec.scope, self.survey.campaign.grid) {
+            (Scope::Halo, Some(grid)) => grid.neighbours(tile, halo_m),
+            _ => vec![tile],
         };
-        let wanted = |of: &UnitId, made: &Made| match of {
-            UnitId::Tile(other) => near.contains(other),
-            UnitId::File(_) => made.parts.iter().any(|part| near.contains(part)),
-            UnitId::Campaign => true,
-        };
-        all.filter(|(of, made)| wanted(of, made)).collect()
+        if let Some(index) = self.by_tile.get(&from) {
+            let files = near.iter().filter_map(|tile| index.get(tile)).flatten();
+            let unique: BTreeMap<&UnitId, &Made> =
+                files.map(|(unit, made)| (*unit, *made)).collect();
+            return unique.into_iter().collect();
+        }
+        let campaign = all.get_key_value(&UnitId::Campaign);
+        let tiles = near.into_iter().filter_map(|tile| all.get_key_value(&UnitId::Tile(tile)));
+        tiles.chain(campaign).collect()
     }
 
     fn take(
@@ -222,9 +262,9 @@ impl<'a> Planner<'a> {
             let name = format!("{producer}/{of}");
             let lossy = *unit == UnitId::Campaign || self.kind_of(from) == UnitKind::File;
             if lossy {
-                draft.losses.push(name)
+                draft.losses.push(name);
             } else {
-                draft.absent.push(name)
+                draft.absent.push(name);
             }
             return;
         }

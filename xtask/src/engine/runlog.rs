@@ -263,7 +263,7 @@ mod tests {
         let event = Event::LostFile { name: "a.laz".into(), error: "empty".into() };
         log.write(&event);
         log.file.lock().unwrap().write_all(b"{\"event\":\"unit\",\"st").unwrap();
-        assert_eq!(list(folder.path()), [log.id.clone()]);
+        assert_eq!(list(folder.path()), std::slice::from_ref(&log.id));
         assert_eq!(read(folder.path(), &log.id).unwrap(), [event]);
     }
 }

@@ -1,5 +1,13 @@
 //! The engine over a tiny chain of stages, each command in a process of its own.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::panic,
+    clippy::print_stdout,
+    reason = "a test may fail"
+)]
+
 mod cases;
 mod resume;
 mod support;
