@@ -138,10 +138,10 @@ impl Block {
         Ok(own.map(|(&place, _)| (self.indices[place], Label::Classified)).collect())
     }
 
-    /// The own points of the supplier's ground class.
+    /// The own points of the supplier's ground and water classes: the surface goes on over a lake.
     fn supplied(&self, cloud: &PointCloud) -> Vec<(usize, Label)> {
         let own = self.indices.iter().zip(&self.own).filter(|(_, own)| **own).map(|(i, _)| *i);
-        own.filter(|&i| cloud.classification[i] == CLASS_GROUND)
+        own.filter(|&i| [CLASS_GROUND, CLASS_WATER].contains(&cloud.classification[i]))
             .map(|i| (i, Label::Supplied))
             .collect()
     }
@@ -165,4 +165,24 @@ fn may_be_ground(cloud: &PointCloud, index: usize, returns: Returns) -> bool {
     let (number, of) = (cloud.return_number[index], cloud.number_of_returns[index]);
     let is_last = number == 0 || of == 0 || number >= of;
     !is_noise && (returns == Returns::All || is_last)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use timberline_pointcloud::{Frame, Point};
+
+    /// A lake without it sags between its shores and grows a canopy of its own surface.
+    #[test]
+    fn supplied_water_belongs_to_the_ground() {
+        let mut cloud = PointCloud::new(Frame::default());
+        for (x, classification) in [(1.0, 2), (9.0, 9), (17.0, 1)] {
+            let point = Point { classification, ..Point::default() };
+            cloud.push_world([x, 1.0, 5.0], &point);
+        }
+        let rect = Rect { min: [0.0, 0.0], max: [64.0, 64.0] };
+        let params = GroundParams { source: Source::Use, ..GroundParams::default() };
+        let labels = classify(&cloud, rect, &params).unwrap();
+        assert_eq!(labels, [Label::Supplied, Label::Supplied, Label::Other]);
+    }
 }

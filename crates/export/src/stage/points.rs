@@ -26,6 +26,8 @@ pub(super) const RESULTS: [(&str, DimensionType, &str); 2] = [
 /// ASPRS classes.
 const UNCLASSIFIED: u8 = 1;
 const GROUND: u8 = 2;
+/// ASPRS class of water.
+const WATER: u8 = 9;
 
 /// Writes all points, tile by tile.
 pub(super) fn write(
@@ -70,7 +72,7 @@ pub(super) fn write(
     Ok(())
 }
 
-/// The points of a tile, ground points in class 2. Points that the source had in class 2 and that
+/// The points of a tile, ground points in class 2 (water in the surface stays class 9). Points that the source had in class 2 and that
 /// are not ground here become unclassified; all others keep the source's class.
 fn labelled(tile: TileId, inputs: &Inputs) -> Result<PointCloud, StageError> {
     let (_, PointTile { mut cloud }) = read::<PointTile>(inputs, tile)?;
@@ -83,8 +85,11 @@ fn labelled(tile: TileId, inputs: &Inputs) -> Result<PointCloud, StageError> {
     for index in ground {
         let points = cloud.len();
         let class = cloud.classification.get_mut(index as usize);
-        *class.ok_or_else(|| misaligned(GroundPoints::NAME, tile, points, index as usize + 1))? =
-            GROUND;
+        let class = class
+            .ok_or_else(|| misaligned(GroundPoints::NAME, tile, points, index as usize + 1))?;
+        if *class != WATER {
+            *class = GROUND;
+        }
     }
     Ok(cloud)
 }
