@@ -58,7 +58,9 @@ pub fn crs_of(
     let keys = GeoKeys::parse(records, notes);
     let by_keys = keys.map(|keys| keys.said(units, notes)).transpose()?.flatten();
     let wkt_first = header.says_wkt() || by_keys.is_none();
-    compare(by_wkt.as_ref(), by_keys.as_ref(), wkt_first, notes);
+    let agree = compare(by_wkt.as_ref(), by_keys.as_ref(), wkt_first, notes);
+    // A text that was not understood, or was overruled, must not come out again with the results.
+    let text = text.filter(|_| by_wkt.is_some() && (wkt_first || agree));
     let (first, second) = if wkt_first { (by_wkt, by_keys) } else { (by_keys, by_wkt) };
     let Some(said) = first.or(second) else {
         notes.say("the file names no coordinate reference system; metres are assumed");
@@ -112,11 +114,13 @@ fn with_units(mut crs: Crs, units: UnitChoice) -> Crs {
     crs
 }
 
-/// Says where two records of one file disagree.
-fn compare(wkt: Option<&Said>, keys: Option<&Said>, wkt_first: bool, notes: &mut Notes) {
-    let (Some(wkt), Some(keys)) = (wkt, keys) else { return };
+/// Says where two records of one file disagree; whether they agree.
+fn compare(wkt: Option<&Said>, keys: Option<&Said>, wkt_first: bool, notes: &mut Notes) -> bool {
+    let (Some(wkt), Some(keys)) = (wkt, keys) else { return true };
+    let mut agree = true;
     let taken = if wkt_first { "WKT" } else { "GeoTIFF keys" };
     let mut differ = |what: &str, a: String, b: String| {
+        agree = false;
         notes.say(format!("{what}: WKT says {a}, GeoTIFF keys say {b}; the {taken} are taken"));
     };
     if let (Some(a), Some(b)) = (wkt.horizontal, keys.horizontal)
@@ -134,6 +138,7 @@ fn compare(wkt: Option<&Said>, keys: Option<&Said>, wkt_first: bool, notes: &mut
     {
         differ("system", format!("EPSG:{a}"), format!("EPSG:{b}"));
     }
+    agree
 }
 
 const PROJECTED: [&str; 3] = ["PROJCS", "PROJCRS", "PROJECTEDCRS"];
@@ -315,6 +320,7 @@ mod tests {
         let (found, notes) = crs(bytes, UnitChoice::default()).unwrap();
         assert_eq!((found.epsg, found.horizontal_m_per_unit), (Some(26910), 1.0));
         assert!(notes[0].contains("WKT says 0.3048 m, GeoTIFF keys say 1 m"), "{notes:?}");
+        assert_eq!(found.wkt, None);
     }
 
     #[test]
