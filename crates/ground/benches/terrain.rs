@@ -43,11 +43,11 @@ fn terrain(criterion: &mut Criterion) {
     group.sample_size(10);
     group.throughput(Throughput::Elements(POINTS as u64));
     group.bench_function("classify a point", |b| {
-        b.iter(|| classify(black_box(&cloud), rect, &filter))
+        b.iter(|| classify(black_box(&cloud), rect, &filter));
     });
     group.throughput(Throughput::Elements(nodes.len() as u64));
     group.bench_function("fit a ground point", |b| {
-        b.iter(|| Surface::build(black_box(&nodes), rect, &params))
+        b.iter(|| Surface::build(black_box(&nodes), rect, &params));
     });
     group.throughput(Throughput::Elements(1));
     let mut i = 0;

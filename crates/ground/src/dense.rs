@@ -91,7 +91,7 @@ impl Cholesky {
                 row[j] = sum / other[j];
             }
             let pivot = row[i] - dot(&row[..i], &row[..i]);
-            if !(pivot > 1e-14 * row[i]) {
+            if pivot.is_nan() || pivot <= 1e-14 * row[i] {
                 return None;
             }
             row[i] = pivot.sqrt();

@@ -95,8 +95,8 @@ impl Default for GroundParams {
             fine_distance_m: 0.3,
             coarse_angle_deg: 30.0,
             fine_angle_deg: 15.0,
-            spike_deg: 25.0,
-            trim_m: 0.12,
+            spike_deg: 20.0,
+            trim_m: 0.08,
             trim_slope: 0.08,
             tolerance_m: 0.08,
         }

@@ -42,6 +42,8 @@ const LAST_REMOVAL: u8 = 3;
 const FLAT_M: f64 = 0.1;
 /// A spike is at least this high, metres.
 const LEAST_SPIKE_M: f64 = 0.3;
+/// How much steeper a spike is while triangles are large: a ridge may lie between the vertices.
+const COARSE_SPIKE: f64 = 1.4;
 /// A pit is at least this deep, metres.
 const LEAST_PIT_M: f64 = 1.0;
 
@@ -67,7 +69,8 @@ pub fn densify(
     for level in levels(params) {
         let steps = if level.cell_m > FINEST_LEVEL_M { STEPS } else { LAST_STEPS };
         for _ in 0..steps {
-            if !ground.step(&level, spike)? {
+            let coarse = level.cell_m > SHARED_M;
+            if !ground.step(&level, if coarse { COARSE_SPIKE * spike } else { spike })? {
                 break;
             }
         }
