@@ -205,3 +205,23 @@ fn resume_of_the_chain_after_twenty_kills() {
     }
     assert!(times.values().all(|times| *times == 1), "{times:?}");
 }
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_ends_cleanly_and_says_how_to_go_on() {
+    let stand = Stand::new("stand_560037_4904081.laz", "edge_m = 32");
+    let child = stand.command(&["--jobs", "2"]).stderr(Stdio::piped()).spawn().unwrap();
+    std::thread::sleep(Duration::from_millis(1200));
+    let interrupted =
+        Command::new("kill").args(["-INT", &child.id().to_string()]).status().unwrap();
+    assert!(interrupted.success());
+    let output = child.wait_with_output().unwrap();
+    let talk = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(1), "{talk}");
+    assert!(
+        talk.contains("interrupted; what is finished is kept. Go on with: cargo xtask run"),
+        "{talk}"
+    );
+    assert_eq!(leftovers(&stand.work()), Vec::<PathBuf>::new());
+    stand.run(&[]);
+}

@@ -52,7 +52,7 @@ pub struct UnitPlan {
     pub files: Vec<InputFile>,
     /// The raw file it reads.
     pub raw: Option<RawFile>,
-    /// Points it reads.
+    /// Points of the unit itself, the halo not counted.
     pub points: u64,
     /// Estimate of its peak memory.
     pub memory_bytes: u64,
@@ -190,8 +190,12 @@ impl<'a> Planner<'a> {
             self.take_raw(&mut draft, &unit, file.map(|file| file.hash.clone()));
         }
         draft.refs.sort();
-        let points = file
-            .map_or(draft.points.values().copied().max().unwrap_or(0), |file| file.facts.points);
+        let most = |points: &BTreeMap<_, u64>| points.values().copied().max().unwrap_or(0);
+        let in_file = file.map(|file| file.facts.points);
+        let (read, points) = match in_file {
+            Some(points) => (points, points),
+            None => (most(&draft.points), most(&draft.own_points)),
+        };
         let task = Task {
             key: key(stage, &draft.refs),
             stage: info.name.to_owned(),
@@ -203,7 +207,7 @@ impl<'a> Planner<'a> {
         let grid = self.survey.campaign.grid;
         Ok(UnitPlan {
             found: self.store.find(&info, &task.unit, &task.key),
-            memory_bytes: stage.stage.memory_bytes(&stage.params, points)?,
+            memory_bytes: stage.stage.memory_bytes(&stage.params, read)?,
             raw: file.map(|file| file.raw.clone()),
             expected_parts: file
                 .zip(grid)
@@ -280,6 +284,9 @@ impl<'a> Planner<'a> {
         let points =
             if shared { made.points / made.parts.len().max(1) as u64 } else { made.points };
         *draft.points.entry(spec.kind).or_default() += points;
+        if shared || of == unit || *unit == UnitId::Campaign {
+            *draft.own_points.entry(spec.kind).or_default() += points;
+        }
     }
 
     fn take_raw(&self, draft: &mut Draft, unit: &UnitId, hash: Option<String>) {
@@ -306,6 +313,7 @@ struct Draft {
     absent: Vec<String>,
     losses: Vec<String>,
     points: BTreeMap<&'static str, u64>,
+    own_points: BTreeMap<&'static str, u64>,
 }
 
 /// The key of a unit: everything that determines its artefacts, hashed.
