@@ -1,5 +1,12 @@
 //! The multiquadric surface against SciPy's `RBFInterpolator` (values made by `oracle/make_fixtures.py`).
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
 use std::path::Path;
 use timberline_ground::{Hardy, Kernel, Sample, Trend};
 

@@ -1,5 +1,12 @@
 //! Accuracy of the terrain model on real scans.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
 mod common;
 
 use common::{Scan, hash01, rms};

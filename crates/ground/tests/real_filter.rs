@@ -1,6 +1,13 @@
 //! The ground filter on real scans with their classes stripped, scored by the terrain it gives at
 //! the supplier's ground points (supplied ground is thinned: agreement by class says little).
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "these are tests"
+)]
+
 mod common;
 
 use common::{Scan, rms};
