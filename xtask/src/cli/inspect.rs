@@ -1,7 +1,7 @@
 //! `inspect`: what an artefact holds.
 
 use super::out::{self, Table};
-use super::{DONE, Usage};
+use super::{DONE, Usage, picture};
 use crate::engine::progress::{bytes, short};
 use anyhow::{Context, Result};
 use serde::Serialize;
@@ -26,6 +26,9 @@ pub struct Args {
     /// Rows of its tables to show
     #[arg(long, default_value_t = 5)]
     rows: usize,
+    /// Draw it into this file as well
+    #[arg(long, value_name = "FILE")]
+    png: Option<PathBuf>,
     /// Print everything but the rows as JSON
     #[arg(long)]
     json: bool,
@@ -44,6 +47,9 @@ pub fn run(args: &Args) -> Result<u8> {
     opened.verify()?;
     let header = opened.header().clone();
     drop(opened);
+    if let Some(target) = &args.png {
+        picture::write(path, &header, target)?;
+    }
     let tables = tables(path, &header)?;
     if args.json {
         let ranges: Vec<Value> = tables.iter().map(|(name, rows)| json!({ "table": name, "rows": rows.len(), "columns": ranges(rows) })).collect();
@@ -175,7 +181,7 @@ fn split(value: &Value) -> Vec<(String, Rows)> {
                 ));
             }
             Value::Array(rows) if !rows.is_empty() => columns.push((name, rows)),
-            Value::Object(inner) if inner.values().any(Value::is_array) => {
+            Value::Object(inner) if name != "frame" && inner.values().any(Value::is_array) => {
                 tables.extend(
                     split(field).into_iter().map(|(inner, rows)| (format!("{name}.{inner}"), rows)),
                 );

@@ -11,6 +11,7 @@ pub mod init;
 pub mod inspect;
 pub mod open;
 pub mod out;
+pub mod picture;
 pub mod pipeline;
 pub mod plan;
 pub mod run;

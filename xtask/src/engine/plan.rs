@@ -197,7 +197,7 @@ impl<'a> Planner<'a> {
             None => (most(&draft.points), most(&draft.own_points)),
         };
         let task = Task {
-            key: key(stage, &draft.refs),
+            key: key(stage, &unit, &draft.refs),
             stage: info.name.to_owned(),
             stage_version: info.version,
             unit,
@@ -317,7 +317,7 @@ struct Draft {
 }
 
 /// The key of a unit: everything that determines its artefacts, hashed.
-fn key(stage: &PipelineStage, refs: &[InputRef]) -> String {
+fn key(stage: &PipelineStage, unit: &UnitId, refs: &[InputRef]) -> String {
     let info = stage.stage.info();
     let mut hasher = blake3::Hasher::new_derive_key("timberline unit key 1");
     let mut add = |text: &str| {
@@ -326,6 +326,7 @@ fn key(stage: &PipelineStage, refs: &[InputRef]) -> String {
         hasher.update(text.as_bytes());
     };
     add(info.name);
+    add(&unit.to_string());
     add(&info.version.to_string());
     add(&CONTAINER_VERSION.to_string());
     for (kind, version, _) in kinds::all() {
@@ -334,10 +335,10 @@ fn key(stage: &PipelineStage, refs: &[InputRef]) -> String {
         }
     }
     add(&canonical(&stage.params));
-    for InputRef { kind, unit, key } in refs {
-        add(kind);
-        add(&unit.to_string());
-        add(key);
+    for input in refs {
+        add(&input.kind);
+        add(&input.unit.to_string());
+        add(&input.key);
     }
     hasher.finalize().to_hex()[..KEY_LEN].to_owned()
 }

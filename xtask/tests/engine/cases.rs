@@ -271,6 +271,16 @@ fn gc_keeps_what_is_used_and_what_is_pinned() {
 }
 
 #[test]
+fn no_two_units_share_a_key() {
+    let stand = ran_once();
+    let mut keys = std::collections::BTreeSet::new();
+    for path in stand.products().keys().filter(|path| path.starts_with("store")) {
+        let (_, entry) = xtask::engine::store::parse_name(path).unwrap();
+        assert!(keys.insert(entry.key), "{}", path.display());
+    }
+}
+
+#[test]
 fn inspect_shows_what_is_inside() {
     let stand = ran_once();
     let path = stand.artefact("sum", &format!("{}-", tile(2, 1)));
