@@ -2,6 +2,8 @@
 
 use std::process::ExitCode;
 use std::sync::atomic::{AtomicBool, Ordering};
+use tracing_subscriber::EnvFilter;
+use tracing_subscriber::filter::LevelFilter;
 use xtask::cli::Program;
 use xtask::engine::panics;
 use xtask::las::LasSurveyor;
@@ -11,7 +13,9 @@ static CANCEL: AtomicBool = AtomicBool::new(false);
 
 fn main() -> ExitCode {
     tracing_subscriber::fmt()
-        .with_env_filter(tracing_subscriber::EnvFilter::from_default_env())
+        .with_env_filter(
+            EnvFilter::builder().with_default_directive(LevelFilter::WARN.into()).from_env_lossy(),
+        )
         .with_writer(std::io::stderr)
         .init();
     panics::quieten();

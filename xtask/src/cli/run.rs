@@ -68,6 +68,12 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
     };
     let progress = Progress::new(if args.quiet { Style::Quiet } else { Style::Auto });
     greet(&opened, &options, &progress);
+    if opened.survey.files.is_empty() {
+        anyhow::bail!(
+            "none of the {} files of the campaign can be used",
+            opened.campaign.files.len()
+        );
+    }
     let runner = Runner {
         campaign: &opened.campaign,
         pipeline: &opened.pipeline,

@@ -1,7 +1,7 @@
 //! Runs a pipeline over a campaign, stage by stage.
 
 use super::lock::UnitLock;
-use super::plan::{Made, Progressed, Standing, UnitPlan, plan_stage};
+use super::plan::{Made, Progressed, Standing, UnitPlan, plan_stage, targets};
 use super::progress::Progress;
 use super::runlog::{Event, FileRecord, Outcome, RunLog, StageRecord, StageSummary, UnitRecord};
 use super::schedule::{self, Limits};
@@ -13,7 +13,7 @@ use crate::config::{Campaign, Pipeline, PipelineStage};
 use anyhow::Result;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 use timberline_artefact::UnitId;
@@ -161,8 +161,8 @@ impl Runner<'_> {
         log.write(&Event::Start {
             time: super::runlog::now(),
             tool_version: env!("CARGO_PKG_VERSION").to_owned(),
-            campaign: self.campaign.folder.clone(),
-            pipeline: self.pipeline.path.clone(),
+            campaign: absolute(&self.campaign.folder),
+            pipeline: absolute(&self.pipeline.path),
             jobs: self.options.limits.jobs,
             memory_bytes: self.options.limits.memory_bytes,
             stages: self.pipeline.stages.iter().map(stage).collect(),
@@ -249,8 +249,29 @@ impl Pass<'_> {
         }
         self.log.write(&Event::Stage(summary.clone()));
         self.runner.progress.end(&summary);
+        self.tell_file_warnings(stage, plans, &made);
         self.runner.store.save();
         (made, summary, failed)
+    }
+
+    /// What was noticed about raw files (missing CRS, normalised heights) concerns the whole run.
+    fn tell_file_warnings(
+        &self,
+        stage: &PipelineStage,
+        plans: &[UnitPlan],
+        made: &BTreeMap<UnitId, Made>,
+    ) {
+        let ready = |plan: &&UnitPlan| {
+            let standing = made.get(plan.unit()).map(|made| made.standing);
+            plan.raw.is_some() && standing == Some(Standing::Ready)
+        };
+        for plan in plans.iter().filter(ready) {
+            let path = targets(self.runner.store, stage, plan).into_iter().next();
+            let header = path.and_then(|path| timberline_artefact::read_header(&path).ok());
+            for warning in header.iter().flat_map(|header| &header.warnings) {
+                self.runner.progress.note(&format!("  {}: {}", warning.subject, warning.message));
+            }
+        }
     }
 
     fn must_run(&self, position: usize, plan: &UnitPlan) -> bool {
@@ -469,6 +490,10 @@ fn record(plan: &UnitPlan, ended: &Ended) -> UnitRecord {
         error: ended.error.clone(),
         inputs: if ended.error.is_some() { inputs.collect() } else { Vec::new() },
     }
+}
+
+fn absolute(path: &Path) -> PathBuf {
+    std::path::absolute(path).unwrap_or_else(|_| path.to_owned())
 }
 
 /// An error with its causes, those that only repeat it left out.

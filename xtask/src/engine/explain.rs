@@ -319,7 +319,13 @@ fn input_differences(old: &[InputRef], new: &[InputRef]) -> Vec<Difference> {
         .chain(changed)
         .collect();
     found.sort_by_key(|difference| match difference {
-        Difference::InputChanged { kind, .. } if own(kind) => 0,
+        Difference::InputChanged { kind, .. }
+        | Difference::InputAdded { kind, .. }
+        | Difference::InputRemoved { kind, .. }
+            if own(kind) =>
+        {
+            0
+        }
         Difference::InputAdded { .. } => 1,
         Difference::InputRemoved { .. } => 2,
         _ => 3,
@@ -357,6 +363,12 @@ pub fn difference_words(stage: &PipelineStage, file: &Path, difference: &Differe
         }
         Difference::Param { name, old, new, .. } => {
             param_words(stage, file, name, old.as_ref(), new.as_ref())
+        }
+        Difference::InputAdded { kind, .. } if kind == CRS => {
+            "[crs] was added to the campaign file".to_owned()
+        }
+        Difference::InputRemoved { kind, .. } if kind == CRS => {
+            "[crs] was taken out of the campaign file".to_owned()
         }
         Difference::InputAdded { kind, unit } => format!("input added: {kind} of {unit}"),
         Difference::InputRemoved { kind, unit } => format!("input removed: {kind} of {unit}"),
