@@ -20,13 +20,14 @@ use crate::cells::{lowest_per_cell, without_pits};
 use crate::params::GroundParams;
 use crate::rim::rim;
 use crate::tin::Tin;
+use std::borrow::Cow;
 
 /// Steps at every level.
 const STEPS: usize = 3;
 /// Steps at the last level.
 const LAST_STEPS: usize = 4;
 /// Rounds of the final trim; each takes at most the highest vertex of a neighbourhood.
-const TRIM_ROUNDS: usize = 8;
+const TRIM_ROUNDS: usize = 5;
 /// Cell of the last level, metres: a step takes at most one point from each.
 const FINEST_LEVEL_M: f64 = 0.5;
 /// Edge of the cells of which only the lowest point can be a vertex, metres.
@@ -34,6 +35,8 @@ pub const FINEST_M: f64 = 0.5;
 /// Down to this cell a step triangulates anew after taking vertices back; below, where taking back is
 /// local and triangulating costs most, it does both with one triangulation, metres.
 const SHARED_M: f64 = 1.5;
+/// Of a level's cell only the lowest points of a grid of so many by so many are looked at.
+const SAMPLED: f64 = 8.0;
 /// A level ends when a step adds less than one vertex in so many.
 const FEW: usize = 1000;
 /// A vertex taken back this often stays out.
@@ -169,7 +172,13 @@ impl<'a> Ground<'a> {
             near && (offset.sine < level.sine || distance.abs() < FLAT_M)
         };
         let open = |i: &usize| !self.is_vertex[*i] && self.removals[*i] < LAST_REMOVAL;
-        self.low.iter().copied().filter(open).filter(|&i| accept(i)).collect()
+        let fine_m = level.cell_m / SAMPLED;
+        let low = if fine_m > FINEST_M {
+            Cow::Owned(lowest_per_cell(self.points, &self.low, fine_m))
+        } else {
+            Cow::Borrowed(&self.low)
+        };
+        low.iter().copied().filter(open).filter(|&i| accept(i)).collect()
     }
 
     /// Takes back vertices that stick out of their neighbours' plane by more than the slope `spike`

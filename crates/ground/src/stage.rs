@@ -43,7 +43,7 @@ impl Stage for GroundStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "ground",
-            version: 2,
+            version: 3,
             summary: "ground points: supplied classes, or TIN densification (Axelsson 2000)",
             unit: UnitKind::Tile,
             inputs: GROUND_INPUTS,
@@ -98,7 +98,7 @@ impl Stage for DtmStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "dtm",
-            version: 2,
+            version: 3,
             summary: "terrain by blended multiquadric patches (Hardy 1971) and heights above it",
             unit: UnitKind::Tile,
             inputs: DTM_INPUTS,

@@ -103,7 +103,7 @@ const GRAIN: usize = 1024;
 /// A patch with fewer nodes looks further afield: a plane's three, and some redundancy.
 const LEAST_NODES: usize = 16;
 /// Patches of a root square that are scored when kernels are chosen.
-const SCORED_PATCHES: usize = 4;
+const SCORED_PATCHES: usize = 2;
 
 /// The rectangle grown to whole buckets, so that all patches with weight in a bucket are known.
 fn whole_buckets(rect: Rect) -> Rect {
