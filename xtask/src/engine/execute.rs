@@ -15,12 +15,15 @@ use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant;
+use std::sync::{Condvar, Mutex, PoisonError};
+use std::time::{Duration, Instant};
 use timberline_artefact::UnitId;
 use timberline_artefact::stage::{Cancelled, Context, Inputs, StageError};
 
 /// A corrupt input is rebuilt by going through the stages again; no store is that broken.
 const MAX_PASSES: usize = 3;
+/// How often the progress of a running unit is looked at.
+const WATCH_EVERY: Duration = Duration::from_millis(500);
 
 /// Which part of a pipeline to run.
 #[derive(Debug, Clone, Default)]
@@ -329,7 +332,7 @@ impl Pass<'_> {
             |plan| {
                 let ended = self.unit(stage, plan);
                 self.log.write(&Event::Unit(record(plan, &ended)));
-                self.runner.progress.unit(plan.points);
+                self.runner.progress.unit(&plan.unit().to_string(), plan.points);
                 ended
             },
         );
@@ -431,7 +434,10 @@ impl Pass<'_> {
             &outputs,
             runner.cancel,
         );
-        let task = || stage.stage.run(&stage.params, &inputs, &context);
+        let task = || {
+            let run = || stage.stage.run(&stage.params, &inputs, &context);
+            watched(runner.progress, plan, || context.progress(), run)
+        };
         catch_unwind(AssertUnwindSafe(task))
             .unwrap_or_else(|payload| Err(panics::describe(&*payload).into()))?;
         let (emitted, declared) = (context.emitted(), stage.stage.info().outputs);
@@ -489,6 +495,46 @@ fn record(plan: &UnitPlan, ended: &Ended) -> UnitRecord {
         warnings: ended.known.warnings,
         error: ended.error.clone(),
         inputs: if ended.error.is_some() { inputs.collect() } else { Vec::new() },
+    }
+}
+
+/// Runs a task while another thread shows how far it is.
+fn watched<R>(
+    progress: &Progress,
+    plan: &UnitPlan,
+    worked_off: impl Fn() -> u64 + Sync,
+    run: impl FnOnce() -> R,
+) -> R {
+    let (done, end) = (Mutex::new(false), Condvar::new());
+    let unit = plan.unit().to_string();
+    let watch = || {
+        let mut ended = done.lock().unwrap_or_else(PoisonError::into_inner);
+        while !*ended {
+            let waited =
+                end.wait_timeout(ended, WATCH_EVERY).unwrap_or_else(PoisonError::into_inner);
+            ended = waited.0;
+            if !*ended {
+                progress.inside(&unit, worked_off() as f64 / plan.points.max(1) as f64);
+            }
+        }
+    };
+    std::thread::scope(|scope| {
+        scope.spawn(watch);
+        // Whatever becomes of the task, also a panic, the watch must end.
+        let _ending = Ending { done: &done, end: &end };
+        run()
+    })
+}
+
+struct Ending<'a> {
+    done: &'a Mutex<bool>,
+    end: &'a Condvar,
+}
+
+impl Drop for Ending<'_> {
+    fn drop(&mut self) {
+        *self.done.lock().unwrap_or_else(PoisonError::into_inner) = true;
+        self.end.notify_all();
     }
 }
 

@@ -19,7 +19,15 @@ impl UnitLock {
     pub fn acquire(path: &Path) -> io::Result<Self> {
         loop {
             let file = OpenOptions::new().create(true).truncate(false).write(true).open(path)?;
-            file.lock()?;
+            match file.lock() {
+                Ok(()) => {}
+                // Without locks two processes may make the same artefact twice, with the same bytes.
+                Err(error) if error.kind() == io::ErrorKind::Unsupported => {
+                    tracing::warn!("{}: this file system has no locks", path.display());
+                    return Ok(Self { path: path.to_owned(), file: Some(file) });
+                }
+                Err(error) => return Err(error),
+            }
             // The holder before may have removed the name while this process waited on the old file.
             if same_file(&file, path) {
                 return Ok(Self { path: path.to_owned(), file: Some(file) });

@@ -2,6 +2,7 @@
 
 use super::runlog::{Outcome, StageSummary};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
 use std::sync::{Mutex, PoisonError};
 use std::time::{Duration, Instant};
@@ -32,9 +33,33 @@ struct Current {
     total: usize,
     done: usize,
     points: u64,
+    /// How far units are that run, as a share of their points.
+    inside: BTreeMap<String, f64>,
     begun: Instant,
     last_line: Instant,
     bar: ProgressBar,
+}
+
+/// Steps of a bar for each unit, so that it moves while a long unit runs.
+const STEPS: f64 = 1000.0;
+
+impl Current {
+    /// Units done, those that run in part.
+    fn units(&self) -> f64 {
+        self.done as f64 + self.inside.values().sum::<f64>()
+    }
+
+    fn words(&self) -> String {
+        let seconds = self.begun.elapsed().as_secs_f64().max(1e-3);
+        let counts = match self.total {
+            1 => format!("{:.0} %", 100.0 * self.units().min(1.0)),
+            total => format!("{}/{total}", self.done),
+        };
+        match self.points {
+            0 => counts,
+            points => format!("{counts}, {} points/s", short(points as f64 / seconds)),
+        }
+    }
 }
 
 impl Progress {
@@ -53,6 +78,7 @@ impl Progress {
             total: to_run,
             done: 0,
             points: 0,
+            inside: BTreeMap::new(),
             begun: now,
             last_line: now,
             bar,
@@ -68,8 +94,11 @@ impl Progress {
         if !self.bars || self.style == Style::Quiet || total == 0 {
             return ProgressBar::hidden();
         }
-        let bar = ProgressBar::with_draw_target(Some(total as u64), ProgressDrawTarget::stderr());
-        let template = "{prefix:>14} {bar:30} {pos}/{len} {msg} ETA {eta}";
+        let bar = ProgressBar::with_draw_target(
+            Some(total as u64 * STEPS as u64),
+            ProgressDrawTarget::stderr(),
+        );
+        let template = "{prefix:>14} {bar:30} {msg}, {elapsed}, ETA {eta}";
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style.progress_chars("=> "));
         }
@@ -78,30 +107,40 @@ impl Progress {
         bar
     }
 
+    /// A unit that runs has worked off this share of its points.
+    pub fn inside(&self, unit: &str, share: f64) {
+        self.change(|current| {
+            current.inside.insert(unit.to_owned(), share.clamp(0.0, 0.99));
+        });
+    }
+
     /// A unit has ended.
-    pub fn unit(&self, points: u64) {
+    pub fn unit(&self, unit: &str, points: u64) {
+        self.change(|current| {
+            current.inside.remove(unit);
+            current.done += 1;
+            current.points += points;
+        });
+    }
+
+    fn change(&self, change: impl FnOnce(&mut Current)) {
         let mut guard = self.stage.lock().unwrap_or_else(PoisonError::into_inner);
         let Some(current) = guard.as_mut() else { return };
-        current.done += 1;
-        current.points += points;
-        let rate = current.points as f64 / current.begun.elapsed().as_secs_f64().max(1e-3);
-        let speed =
-            if current.points > 0 { format!("{} points/s", short(rate)) } else { String::new() };
-        current.bar.set_message(speed.clone());
-        current.bar.inc(1);
-        if self.bars || self.style == Style::Quiet || current.last_line.elapsed() < LINE_EVERY {
+        change(current);
+        current.bar.set_message(current.words());
+        current.bar.set_position((current.units() * STEPS) as u64);
+        let silent = self.bars || self.style == Style::Quiet;
+        let finished = current.done == current.total;
+        if silent || finished || current.last_line.elapsed() < LINE_EVERY {
             return;
         }
         current.last_line = Instant::now();
-        let left = current.begun.elapsed().as_secs_f64() / current.done as f64
-            * (current.total - current.done) as f64;
-        let line = format!(
-            "{}: {}/{}, {speed}, about {} left",
-            current.name,
-            current.done,
-            current.total,
-            duration(left)
-        );
+        let (units, total) = (current.units(), current.total as f64);
+        let left = match units > 0.0 {
+            true => duration(current.begun.elapsed().as_secs_f64() / units * (total - units)),
+            false => "unknown time".to_owned(),
+        };
+        let line = format!("{}: {}, about {left} left", current.name, current.words());
         drop(guard);
         self.note(&line);
     }
