@@ -83,6 +83,7 @@ impl Progress {
             last_line: now,
             bar,
         };
+        current.bar.set_message(current.words());
         *self.stage.lock().unwrap_or_else(PoisonError::into_inner) = Some(current);
         if !self.bars && self.style == Style::Auto && to_run > 0 {
             let kept = if cached > 0 { format!(", {cached} up to date") } else { String::new() };
