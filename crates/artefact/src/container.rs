@@ -159,6 +159,12 @@ impl ContainerReader {
         &self.header
     }
 
+    /// The header alone.
+    #[must_use]
+    pub fn into_header(self) -> Header {
+        self.header
+    }
+
     /// Number of payload bytes.
     #[must_use]
     pub fn payload_len(&self) -> u64 {

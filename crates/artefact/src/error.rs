@@ -75,6 +75,16 @@ pub enum Error {
         /// The unit.
         unit: String,
     },
+    /// A stage did not write exactly the kinds it declares.
+    #[error("stage `{stage}` wrote {written:?} but declares {declared:?}")]
+    Undeclared {
+        /// The stage.
+        stage: String,
+        /// Kinds it declares, sorted.
+        declared: Vec<&'static str>,
+        /// Kinds it wrote, sorted.
+        written: Vec<&'static str>,
+    },
     /// Two artefacts that describe the same points do not have the same number of values.
     #[error("`{kind}` of {unit} has {found} values for {expected} points")]
     Misaligned {

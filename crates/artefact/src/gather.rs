@@ -4,7 +4,7 @@ use crate::kinds::{GroundPoints, Heights, Labels, PointTile};
 use crate::stage::Inputs;
 use crate::{Error, Facts, Kind};
 use timberline_pointcloud::order::canonical_order;
-use timberline_pointcloud::{PointCloud, Rect, TileId};
+use timberline_pointcloud::{PointCloud, Rect, TileGrid, TileId};
 
 /// Columns that other artefacts hold for the points of a tile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,10 +13,8 @@ pub enum Aligned {
     Height,
     /// Whether a point is ground, from [`GroundPoints`].
     Ground,
-    /// Tree id, from [`Labels`].
-    Tree,
-    /// Score of the tree id, from [`Labels`].
-    Score,
+    /// Tree id and its score, from [`Labels`].
+    Label,
 }
 
 /// The points of a tile and of its surroundings, in canonical order and in the frame of the tile.
@@ -51,85 +49,74 @@ pub struct Surroundings {
 /// # Errors
 /// What reading the artefacts says, and [`Error::Misaligned`].
 pub fn gather(inputs: &Inputs, halo_m: f64, with: &[Aligned]) -> Result<Surroundings, Error> {
-    let tile = inputs.tile()?;
-    let own_path = inputs.own_path(PointTile::NAME)?;
-    let located = Facts::located_like(&crate::read_header(own_path)?.facts);
-    let grid = located.grid.ok_or_else(|| Error::corrupt(own_path, "header", "no tile grid"))?;
-    let frame = located.frame.unwrap_or_default();
-    let tile_rect = grid.rect(tile);
-    let corner = [-(frame.origin_m[0] as f64), -(frame.origin_m[1] as f64)];
-    let mut all = Surroundings {
-        cloud: PointCloud::new(frame),
-        tile_rect,
-        local_rect: tile_rect.moved(corner),
-        tile,
-        located,
-        ..Surroundings::default()
-    };
+    let (mut all, grid) = own_tile(inputs, with)?;
+    let reach = all.tile_rect.grown(halo_m);
     for other in inputs.tiles_of(PointTile::NAME) {
-        if grid.rect(other).touches(&tile_rect.grown(halo_m)) {
-            add_tile(&mut all, inputs, other, halo_m, with)?;
+        if other != all.tile && grid.rect(other).touches(&reach) {
+            let path = inputs.tile_path(PointTile::NAME, other)?;
+            let part = PointTile::read_within(path, &reach)?;
+            add_columns(&mut all, inputs, other, with, &part.index, part.tile_len)?;
+            all.own.resize(all.own.len() + part.index.len(), None);
+            all.cloud.append(&part.cloud)?;
         }
     }
     Ok(sorted(all))
 }
 
-fn add_tile(
-    all: &mut Surroundings,
-    inputs: &Inputs,
-    other: TileId,
-    halo_m: f64,
-    with: &[Aligned],
-) -> Result<(), Error> {
-    let path = inputs.tile_path(PointTile::NAME, other)?;
-    let is_own = other == all.tile;
-    let reach = if is_own { f64::INFINITY } else { halo_m };
-    let (header, part) = PointTile::read_within(path, &all.tile_rect.grown(reach))?;
-    let expected = header.facts.counts.get("points").map_or(part.index.len(), |n| *n as usize);
-    if is_own {
-        all.own_len = part.index.len();
-    }
-    all.own.extend(part.index.iter().map(|&i| is_own.then_some(i)));
-    all.cloud.append(&part.cloud)?;
-    for column in with {
-        add_column(all, inputs, other, *column, &part.index, expected)?;
-    }
-    Ok(())
+/// The tile itself: all of its points, in its own frame.
+fn own_tile(inputs: &Inputs, with: &[Aligned]) -> Result<(Surroundings, TileGrid), Error> {
+    let tile = inputs.tile()?;
+    let path = inputs.own_path(PointTile::NAME)?;
+    let (header, PointTile { cloud }) = crate::read::<PointTile>(path)?;
+    let grid = header.facts.grid.ok_or_else(|| Error::corrupt(path, "header", "no tile grid"))?;
+    let tile_rect = grid.rect(tile);
+    let [x, y, _] = cloud.frame.origin_m.map(|value| -(value as f64));
+    let index: Vec<u32> = (0..cloud.len() as u32).collect();
+    let mut all = Surroundings {
+        own: index.iter().map(|&index| Some(index)).collect(),
+        own_len: cloud.len(),
+        cloud,
+        tile_rect,
+        local_rect: tile_rect.moved([x, y]),
+        tile,
+        located: Facts::located_like(&header.facts),
+        ..Surroundings::default()
+    };
+    add_columns(&mut all, inputs, tile, with, &index, index.len())?;
+    Ok((all, grid))
 }
 
-fn add_column(
+/// Adds the values of some points of a tile (`index`) to the columns asked for.
+fn add_columns(
     all: &mut Surroundings,
     inputs: &Inputs,
-    other: TileId,
-    column: Aligned,
+    tile: TileId,
+    with: &[Aligned],
     index: &[u32],
     expected: usize,
 ) -> Result<(), Error> {
+    fn pick<T: Copy>(values: &[T], index: &[u32]) -> impl Iterator<Item = T> {
+        index.iter().map(|&i| values[i as usize])
+    }
     let check = |kind: &'static str, found: usize| {
-        let unit = format!("tile:{other}");
+        let unit = format!("tile:{tile}");
         let misaligned = Error::Misaligned { kind, unit, expected, found };
         if found == expected { Ok(()) } else { Err(misaligned) }
     };
-    match column {
-        Aligned::Height => {
-            let heights = inputs.of_tile::<Heights>(other)?;
-            check(Heights::NAME, heights.height_m.len())?;
-            all.height_m.extend(index.iter().map(|&i| heights.height_m[i as usize]));
-        }
-        Aligned::Tree => {
-            let labels = inputs.of_tile::<Labels>(other)?;
-            check(Labels::NAME, labels.tree_id.len())?;
-            all.tree_id.extend(index.iter().map(|&i| labels.tree_id[i as usize]));
-        }
-        Aligned::Score => {
-            let labels = inputs.of_tile::<Labels>(other)?;
-            check(Labels::NAME, labels.score.len())?;
-            all.score.extend(index.iter().map(|&i| labels.score[i as usize]));
-        }
-        Aligned::Ground => {
-            let ground = inputs.of_tile::<GroundPoints>(other)?.ground;
-            all.is_ground.extend(index.iter().map(|i| ground.binary_search(i).is_ok()));
-        }
+    if with.contains(&Aligned::Height) {
+        let Heights { height_m } = inputs.of_tile(tile)?;
+        check(Heights::NAME, height_m.len())?;
+        all.height_m.extend(pick(&height_m, index));
+    }
+    if with.contains(&Aligned::Ground) {
+        let GroundPoints { ground, .. } = inputs.of_tile(tile)?;
+        all.is_ground.extend(index.iter().map(|i| ground.binary_search(i).is_ok()));
+    }
+    if with.contains(&Aligned::Label) {
+        let Labels { tree_id, score } = inputs.of_tile(tile)?;
+        check(Labels::NAME, tree_id.len().min(score.len()))?;
+        all.tree_id.extend(pick(&tree_id, index));
+        all.score.extend(pick(&score, index));
     }
     Ok(())
 }

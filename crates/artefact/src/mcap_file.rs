@@ -142,6 +142,12 @@ impl McapReader {
         &self.header
     }
 
+    /// The header alone.
+    #[must_use]
+    pub fn into_header(self) -> Header {
+        self.header
+    }
+
     /// Number of messages.
     #[must_use]
     pub fn message_count(&self) -> usize {
@@ -156,15 +162,11 @@ impl McapReader {
         metadata(&self.path, &self.bytes, &self.summary, name)
     }
 
-    /// The messages with the given numbers (ascending), decoded.
+    /// The message with the given number, decoded.
     ///
     /// # Errors
     /// [`Error::Corrupt`] naming the chunk.
-    pub fn messages<T: foxglove::Decode>(&self, numbers: &[usize]) -> Result<Vec<T>, Error> {
-        numbers.iter().map(|&number| self.message(number)).collect()
-    }
-
-    fn message<T: foxglove::Decode>(&self, number: usize) -> Result<T, Error> {
+    pub fn message<T: foxglove::Decode>(&self, number: usize) -> Result<T, Error> {
         let place = format!("chunk {number}");
         let corrupt = |detail: String| Error::corrupt(&self.path, &place, detail);
         let index = self

@@ -5,7 +5,7 @@ use crate::mcap_file::{self, McapReader};
 use crate::{Error, Header, Kind};
 use std::fs::File;
 use std::io::Read;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 /// An open artefact of either file format.
 pub enum Opened {
@@ -43,6 +43,15 @@ impl Opened {
         }
     }
 
+    /// The header, when nothing else is wanted any more.
+    #[must_use]
+    pub fn into_header(self) -> Header {
+        match self {
+            Self::Container(reader) => reader.into_header(),
+            Self::Mcap(reader) => reader.into_header(),
+        }
+    }
+
     /// Checks every byte of the file (an MCAP was checked when it was opened).
     ///
     /// # Errors
@@ -60,7 +69,7 @@ impl Opened {
 /// # Errors
 /// As [`Opened::open`].
 pub fn read_header(path: &Path) -> Result<Header, Error> {
-    Opened::open(path).map(|opened| opened.header().clone())
+    Opened::open(path).map(Opened::into_header)
 }
 
 /// Reads an artefact of a known kind, checking all of it.
@@ -70,8 +79,8 @@ pub fn read_header(path: &Path) -> Result<Header, Error> {
 pub fn read<K: Kind>(path: &Path) -> Result<(Header, K), Error> {
     let mut opened = Opened::open(path)?;
     check_kind::<K>(path, opened.header())?;
-    let value = K::decode(&PathBuf::from(path), &mut opened)?;
-    Ok((opened.header().clone(), value))
+    let value = K::decode(path, &mut opened)?;
+    Ok((opened.into_header(), value))
 }
 
 /// Checks that a header announces a kind in the version this program reads.

@@ -1,6 +1,7 @@
 //! World-aligned rasters.
 
 use serde::{Deserialize, Serialize};
+use timberline_pointcloud::Window;
 
 /// A raster whose cells lie on the lattice of whole multiples of the cell size in world coordinates.
 ///
@@ -32,6 +33,13 @@ impl Raster {
         let rows = (first(rect.max[1]) - row0).max(0) as u32;
         let values = vec![f64::NAN; columns as usize * rows as usize];
         Self { cell_m, column0, row0, columns, rows, values }
+    }
+
+    /// The cells it covers.
+    #[must_use]
+    pub fn window(&self) -> Window {
+        let Self { column0, row0, columns, rows, .. } = *self;
+        Window { column0, row0, columns, rows }
     }
 
     /// World position of a cell's centre.

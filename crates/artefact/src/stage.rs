@@ -373,27 +373,24 @@ impl<'a> Context<'a> {
         Ok(())
     }
 
-    /// Lets all results appear. Called by the orchestrator after the task has succeeded.
+    /// Lets all results appear, and returns the kind and place of each in the order of emission.
+    /// Called by the orchestrator after the task has succeeded.
     ///
     /// # Errors
-    /// [`Error::Io`].
-    pub fn publish(self) -> Result<Vec<PathBuf>, Error> {
+    /// [`Error::Undeclared`] when the kinds are not exactly those `declared`; [`Error::Io`].
+    pub fn publish(self, declared: &[&'static str]) -> Result<Vec<(&'static str, PathBuf)>, Error> {
         let staged = self.staged.into_inner().unwrap_or_else(std::sync::PoisonError::into_inner);
-        staged.into_iter().map(|(_, file)| file.publish()).collect()
-    }
-
-    /// Kinds emitted so far, sorted.
-    #[must_use]
-    pub fn emitted(&self) -> Vec<&'static str> {
-        let mut kinds: Vec<_> = lock(&self.staged).iter().map(|(kind, _)| *kind).collect();
-        kinds.sort_unstable();
-        kinds
-    }
-
-    /// Kinds emitted so far, in the order of emission (that of [`Context::publish`]).
-    #[must_use]
-    pub fn emitted_in_order(&self) -> Vec<&'static str> {
-        lock(&self.staged).iter().map(|(kind, _)| *kind).collect()
+        let sorted = |mut kinds: Vec<&'static str>| {
+            kinds.sort_unstable();
+            kinds
+        };
+        let written = sorted(staged.iter().map(|(kind, _)| *kind).collect());
+        let declared = sorted(declared.to_vec());
+        if written != declared {
+            let stage = self.task.stage.clone();
+            return Err(Error::Undeclared { stage, declared, written });
+        }
+        staged.into_iter().map(|(kind, file)| Ok((kind, file.publish()?))).collect()
     }
 
     fn header<K: Kind>(&self, facts: Facts) -> Header {

@@ -5,13 +5,23 @@
 mod common;
 
 use proptest::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
+use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::*;
-use timberline_artefact::{Error, Kind, Opened, read};
-use timberline_pointcloud::{Rect, frame::quantise};
+use timberline_artefact::stage::{Campaign, Context, Inputs, Params, Stage, StageError, StageInfo};
+use timberline_artefact::{Aligned, Error, Kind, Opened, UnitId, UnitKind, gather, read};
+use timberline_pointcloud::{Frame, PointCloud, Rect, TileId, frame::quantise};
 
 fn golden() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("golden")
+}
+
+/// The golden file of a kind in its present version.
+fn golden_file(kind: &str) -> PathBuf {
+    let info = info(kind).unwrap();
+    golden().join(format!("{kind}-v{}.{}", info.version, info.extension))
 }
 
 /// Reads an artefact of any kind in full.
@@ -48,7 +58,7 @@ fn a_part_holds_the_points_of_the_rectangle_and_their_indices() {
     let folder = tempfile::tempdir().unwrap();
     let (_, path) = common::write_all(folder.path()).remove(0);
     let rect = Rect { min: [470.0, -110.0], max: [490.0, -90.0] };
-    let (_, part) = PointTile::read_within(&path, &rect).unwrap();
+    let part = PointTile::read_within(&path, &rect).unwrap();
     let whole = common::cloud();
     let expected: Vec<u32> = (0..500u32)
         .filter(|&i| {
@@ -58,6 +68,88 @@ fn a_part_holds_the_points_of_the_rectangle_and_their_indices() {
         .collect();
     assert_eq!(part.index, expected);
     assert_eq!(part.cloud, whole.select(&expected));
+}
+
+/// Two tiles side by side; a height of every point is its index in its tile.
+fn two_tiles(folder: &Path) -> (Inputs, PointCloud) {
+    let east = common::cloud();
+    let west = PointCloud { frame: Frame::new([448 - 64, -128, 1]), ..east.clone() };
+    let mut store = Alone::new(folder, Campaign::default());
+    for (ix, cloud) in [(6, &west), (7, &east)] {
+        let unit = UnitId::Tile(TileId { ix, iy: -2 });
+        let height_m = (0..cloud.len()).map(|i| i as f32).collect();
+        let facts = common::facts(cloud.frame);
+        store.put(unit.clone(), &PointTile { cloud: cloud.clone() }, facts.clone()).unwrap();
+        store.put(unit, &Heights { height_m }, facts).unwrap();
+    }
+    (Inputs::new(common::unit(), None, store.files), west)
+}
+
+#[test]
+fn a_tile_is_gathered_with_what_lies_in_the_halo() {
+    let folder = tempfile::tempdir().unwrap();
+    let (inputs, west) = two_tiles(folder.path());
+    let all = gather(&inputs, 5.0, &[Aligned::Height]).unwrap();
+    let east = common::cloud();
+    let in_halo = west.x.iter().filter(|x| **x >= 64.0 - 5.0).count();
+    assert!(in_halo > 0 && in_halo < west.len());
+    assert_eq!((all.own_len, all.cloud.len()), (east.len(), east.len() + in_halo));
+    assert_eq!(all.cloud, all.cloud.in_canonical_order());
+    for (place, own) in all.own.iter().enumerate() {
+        let index = all.height_m[place] as usize;
+        let source = if own.is_some() { &east } else { &west };
+        assert_eq!(all.cloud.world(place), source.world(index));
+        assert!(own.is_none_or(|own| own as usize == index));
+    }
+    let own: Vec<f32> = (0..east.len()).map(|i| i as f32).collect();
+    assert_eq!(all.own_values(&all.height_m), own);
+}
+
+#[test]
+fn a_column_of_another_length_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let (inputs, _) = two_tiles(folder.path());
+    let mut store = Alone::new(folder.path(), Campaign::default());
+    let west = UnitId::Tile(TileId { ix: 6, iy: -2 });
+    let short = Heights { height_m: vec![0.0; 499] };
+    store.put(west, &short, common::facts(common::cloud().frame)).unwrap();
+    let error = gather(&inputs, 5.0, &[Aligned::Height]).unwrap_err().to_string();
+    assert!(error.contains("`heights` of tile:6_-2 has 499 values for 500 points"), "{error}");
+}
+
+#[test]
+fn a_stage_must_write_what_it_declares() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut store = Alone::new(folder.path(), Campaign::default());
+    let error = store.run::<Silent>(common::unit(), None, &Nothing::default()).unwrap_err();
+    assert!(error.to_string().contains("wrote [] but declares [\"trees\"]"), "{error}");
+}
+
+#[derive(Clone, Default, Serialize, Deserialize, JsonSchema)]
+struct Nothing {}
+
+impl Params for Nothing {}
+
+/// Declares trees and writes nothing.
+struct Silent;
+
+impl Stage for Silent {
+    type Params = Nothing;
+
+    fn info() -> StageInfo {
+        StageInfo {
+            name: "silent",
+            version: 1,
+            summary: "",
+            unit: UnitKind::Tile,
+            inputs: &[],
+            outputs: &[Trees::NAME],
+        }
+    }
+
+    fn run(_: &Nothing, _: &Inputs, _: &Context<'_>) -> Result<(), StageError> {
+        Ok(())
+    }
 }
 
 #[test]
@@ -155,14 +247,10 @@ proptest! {
 /// Raise a kind's version: add its file to the folder by `--ignored write_golden_files`, keep the old.
 #[test]
 fn golden_files_stay_readable() {
-    for (kind, version, _) in all() {
-        if kind == Shards::NAME {
-            continue;
-        }
-        let extension = extension(kind).unwrap();
-        let path = golden().join(format!("{kind}-v{version}.{extension}"));
+    for kind in all().iter().filter(|kind| kind.name != Shards::NAME) {
+        let path = golden_file(kind.name);
         assert!(path.exists(), "{} is missing", path.display());
-        read_any(kind, &path).unwrap();
+        read_any(kind.name, &path).unwrap();
     }
 }
 
@@ -170,9 +258,7 @@ fn golden_files_stay_readable() {
 fn golden_files_hold_what_was_written() {
     let folder = tempfile::tempdir().unwrap();
     for (kind, written) in common::write_all(folder.path()) {
-        let version = all().iter().find(|(name, ..)| *name == kind).unwrap().1;
-        let extension = extension(kind).unwrap();
-        let kept = golden().join(format!("{kind}-v{version}.{extension}"));
+        let kept = golden_file(kind);
         assert_eq!(std::fs::read(kept).unwrap(), std::fs::read(written).unwrap(), "{kind}");
     }
 }
@@ -196,8 +282,7 @@ fn a_newer_version_names_both_and_the_remedy() {
 fn write_golden_files() {
     let folder = tempfile::tempdir().unwrap();
     for (kind, written) in common::write_all(folder.path()) {
-        let version = all().iter().find(|(name, ..)| *name == kind).unwrap().1;
-        let kept = golden().join(format!("{kind}-v{version}.{}", extension(kind).unwrap()));
+        let kept = golden_file(kind);
         if !kept.exists() {
             std::fs::copy(written, kept).unwrap();
         }

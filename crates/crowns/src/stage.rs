@@ -184,7 +184,7 @@ impl Stage for CrownFitStage {
         inputs: &Inputs,
         context: &Context<'_>,
     ) -> Result<(), StageError> {
-        let columns = [Aligned::Height, Aligned::Tree, Aligned::Score];
+        let columns = [Aligned::Height, Aligned::Label];
         let near = gather(inputs, Self::halo_m(params), &columns)?;
         let (_, CrownModels { models }) = inputs.own()?;
         check_reach(&models, params.reach_m)?;

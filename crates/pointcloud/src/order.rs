@@ -33,9 +33,8 @@ fn interleave(value: u32) -> u64 {
 pub fn canonical_order(cloud: &PointCloud) -> Vec<u32> {
     let mut keyed: Vec<(u64, [i64; 3], u32)> = (0..cloud.len())
         .map(|index| {
-            let world = cloud.world(index);
-            let [x, y, z] = world.map(ticks_from_world);
-            (morton(world[0], world[1]), [z, x, y], index as u32)
+            let (code, position) = key(cloud, index);
+            (code, position, index as u32)
         })
         .collect();
     keyed.sort_unstable_by(|a, b| {
@@ -52,12 +51,14 @@ pub fn canonical_order(cloud: &PointCloud) -> Vec<u32> {
 /// Equal only for points alike in position and all attributes.
 #[must_use]
 pub fn compare(cloud: &PointCloud, a: usize, b: usize) -> std::cmp::Ordering {
-    let key = |index: usize| {
-        let world = cloud.world(index);
-        let [x, y, z] = world.map(ticks_from_world);
-        (morton(world[0], world[1]), [z, x, y])
-    };
-    key(a).cmp(&key(b)).then_with(|| compare_attributes(cloud, a, b))
+    key(cloud, a).cmp(&key(cloud, b)).then_with(|| compare_attributes(cloud, a, b))
+}
+
+/// Code on the curve and position in ticks (z first: it differs most often within a cell).
+fn key(cloud: &PointCloud, index: usize) -> (u64, [i64; 3]) {
+    let world = cloud.world(index);
+    let [x, y, z] = world.map(ticks_from_world);
+    (morton(world[0], world[1]), [z, x, y])
 }
 
 /// Compares all attributes of two points of one cloud, extra columns included.

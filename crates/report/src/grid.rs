@@ -49,6 +49,16 @@ impl Grid {
         [(x / self.cell_m).floor() as i64, (y / self.cell_m).floor() as i64]
     }
 
+    /// The part of the window whose rows [`Grid::sample`] looks at between two world y, with so many
+    /// rows more on either side as the window has.
+    #[must_use]
+    pub fn rows_around(&self, [south, north]: [f64; 2], margin: i64) -> Window {
+        let row = |y: f64| (y / self.cell_m).floor() as i64;
+        let row0 = (row(south) - 1 - margin).max(self.window.row0);
+        let end = (row(north) + 2 + margin).min(self.window.end_row());
+        Window { row0, rows: (end - row0).max(0) as u32, ..self.window }
+    }
+
     /// Bilinear value at a world position among the cells that have values; `None` where the cell
     /// that holds the position has none.
     #[must_use]
@@ -99,15 +109,9 @@ pub(crate) fn range(values: impl Iterator<Item = f32>, left_out: f64) -> Option<
 
 impl From<&Raster> for Grid {
     fn from(raster: &Raster) -> Self {
-        let window = Window {
-            column0: raster.column0,
-            row0: raster.row0,
-            columns: raster.columns,
-            rows: raster.rows,
-        };
         Self {
             cell_m: raster.cell_m,
-            window,
+            window: raster.window(),
             values: raster.values.iter().map(|value| *value as f32).collect(),
         }
     }

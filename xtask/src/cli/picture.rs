@@ -7,7 +7,6 @@ use timberline_artefact::kinds::{
     CrownModel, CrownModels, GroundModel, GroundPoints, Heights, Labels, PointTile, Trees, Treetops,
 };
 use timberline_artefact::{Header, Kind, read};
-use timberline_pointcloud::Window;
 use timberline_report::Grid;
 use timberline_report::canvas::Canvas;
 use timberline_report::pictures::{self, Heading, PointColour};
@@ -49,16 +48,7 @@ fn draw(path: &Path, header: &Header) -> Result<Canvas> {
 }
 
 fn terrain(heading: &Heading<'_>, model: &GroundModel) -> Result<Canvas> {
-    let raster = &model.raster;
-    let window = Window {
-        column0: raster.column0,
-        row0: raster.row0,
-        columns: raster.columns,
-        rows: raster.rows,
-    };
-    let values = raster.values.iter().map(|value| *value as f32).collect();
-    let grid = Grid { cell_m: raster.cell_m, window, values };
-    Ok(pictures::raster(heading, &grid, "Elevation [m]")?)
+    Ok(pictures::raster(heading, &Grid::from(&model.raster), "Elevation [m]")?)
 }
 
 /// Trees are drawn as the crown models they came from.

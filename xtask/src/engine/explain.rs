@@ -263,10 +263,7 @@ pub fn differences(stage: &PipelineStage, plan: &UnitPlan, old: &Header) -> Vec<
             new: plan.task.stage_version,
         });
     }
-    let version = kinds::all()
-        .into_iter()
-        .find(|(kind, ..)| *kind == old.kind)
-        .map(|(_, version, _)| version);
+    let version = kinds::info(&old.kind).map(|info| info.version);
     if let Some(new) = version.filter(|new| *new != old.kind_version) {
         found.push(Difference::KindVersion { kind: old.kind.clone(), old: old.kind_version, new });
     }

@@ -329,7 +329,7 @@ fn key(stage: &PipelineStage, unit: &UnitId, refs: &[InputRef]) -> String {
     add(&unit.to_string());
     add(&info.version.to_string());
     add(&CONTAINER_VERSION.to_string());
-    for (kind, version, _) in kinds::all() {
+    for kinds::KindInfo { name: kind, version, .. } in kinds::all() {
         if info.outputs.contains(&kind) {
             add(&format!("{kind} {version}"));
         }

@@ -78,7 +78,7 @@ impl Store {
     /// Where a unit's artefact of a kind is.
     #[must_use]
     pub fn path(&self, stage: &str, unit: &UnitId, key: &str, kind: &str) -> PathBuf {
-        let extension = kinds::extension(kind).unwrap_or(kinds::TABLE_EXTENSION);
+        let extension = kinds::info(kind).map_or(kinds::TABLE_EXTENSION, |info| info.extension);
         artefact_path(&self.folder, stage, unit, key, kind, extension)
     }
 

@@ -112,11 +112,29 @@ macro_rules! table_kind {
 }
 pub(crate) use table_kind;
 
-/// Name, version and summary of every kind, in the order of the pipeline.
+/// What is fixed about a kind.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct KindInfo {
+    /// See [`Kind::NAME`].
+    pub name: &'static str,
+    /// See [`Kind::VERSION`].
+    pub version: u32,
+    /// See [`Kind::EXTENSION`].
+    pub extension: &'static str,
+    /// See [`Kind::SUMMARY`].
+    pub summary: &'static str,
+}
+
+/// Every kind, in the order of the pipeline.
 #[must_use]
-pub fn all() -> Vec<(&'static str, u32, &'static str)> {
-    fn row<K: Kind>() -> (&'static str, u32, &'static str) {
-        (K::NAME, K::VERSION, K::SUMMARY)
+pub fn all() -> Vec<KindInfo> {
+    fn row<K: Kind>() -> KindInfo {
+        KindInfo {
+            name: K::NAME,
+            version: K::VERSION,
+            extension: K::EXTENSION,
+            summary: K::SUMMARY,
+        }
     }
     vec![
         row::<Shards>(),
@@ -132,9 +150,8 @@ pub fn all() -> Vec<(&'static str, u32, &'static str)> {
     ]
 }
 
-/// The file ending of a kind; `None` for a name that is no kind.
+/// A kind by its name.
 #[must_use]
-pub fn extension(kind: &str) -> Option<&'static str> {
-    let known = all().iter().any(|(name, ..)| *name == kind);
-    known.then(|| if kind == PointTile::NAME { PointTile::EXTENSION } else { TABLE_EXTENSION })
+pub fn info(name: &str) -> Option<KindInfo> {
+    all().into_iter().find(|kind| kind.name == name)
 }

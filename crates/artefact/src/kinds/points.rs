@@ -43,6 +43,8 @@ pub struct Part {
     pub cloud: PointCloud,
     /// Index of each in the tile.
     pub index: Vec<u32>,
+    /// Number of points of the whole tile.
+    pub tile_len: usize,
 }
 
 impl PointTile {
@@ -58,7 +60,7 @@ impl PointTile {
     ///
     /// # Errors
     /// As [`crate::read`].
-    pub fn read_within(path: &Path, rect: &Rect) -> Result<(Header, Part), Error> {
+    pub fn read_within(path: &Path, rect: &Rect) -> Result<Part, Error> {
         let opened = Opened::open(path)?;
         crate::open::check_kind::<Self>(path, opened.header())?;
         let Opened::Mcap(reader) = &opened else {
@@ -70,7 +72,7 @@ impl PointTile {
         };
         let mut part = read_runs(path, reader, wanted)?;
         keep_inside(&mut part, rect);
-        Ok((opened.header().clone(), part))
+        Ok(part)
     }
 }
 
@@ -138,13 +140,12 @@ fn read_runs(
     let runs: Vec<Run> = serde_json::from_str(&reader.record(RUNS_RECORD)?)
         .map_err(|error| Error::corrupt(path, RUNS_RECORD, error.to_string()))?;
     let frame = reader.header().facts.frame.unwrap_or_default();
-    let mut part = Part { cloud: PointCloud::new(frame), index: Vec::new() };
+    let mut part = Part { cloud: PointCloud::new(frame), index: Vec::new(), tile_len: 0 };
+    part.tile_len = runs.iter().map(|run| run.len as usize).sum();
     for (number, run) in runs.iter().enumerate().filter(|(_, run)| wanted(run)) {
-        let messages = reader.messages::<PointCloudMessage>(&[number])?;
-        for message in &messages {
-            unpack(message, &mut part.cloud)
-                .map_err(|detail| Error::corrupt(path, &format!("chunk {number}"), detail))?;
-        }
+        let message = reader.message::<PointCloudMessage>(number)?;
+        unpack(&message, &mut part.cloud)
+            .map_err(|detail| Error::corrupt(path, &format!("chunk {number}"), detail))?;
         part.index.extend(run.start..run.start.saturating_add(run.len));
     }
     if part.index.len() == part.cloud.len() {

@@ -3,7 +3,7 @@
 use super::Params;
 use crate::las::{Colour, Dimension, DimensionType, is_standard_field};
 use crate::sorted_trees::SortedTrees;
-use crate::{Error, Mosaic, Window};
+use crate::{Error, Mosaic};
 use std::collections::BTreeMap;
 use std::path::Path;
 use timberline_artefact::kinds::{GroundModel, Heights, PointTile, Trees};
@@ -120,12 +120,7 @@ impl Survey {
     fn add_terrain(&mut self, tile: TileId, inputs: &Inputs) -> Result<(), StageError> {
         let (header, GroundModel { raster, .. }) = read::<GroundModel>(inputs, tile)?;
         self.note_stage(&header);
-        let window = Window {
-            column0: raster.column0,
-            row0: raster.row0,
-            columns: raster.columns,
-            rows: raster.rows,
-        };
+        let window = raster.window();
         if window.is_empty() {
             return Ok(());
         }
