@@ -4,7 +4,7 @@
 //! differences of their bits, everything split into planes of bytes, then zstd at level 1.
 
 use crate::voxels::Voxel;
-use timberline_pointcloud::frame::{TICKS_PER_M, world_from_ticks};
+use timberline_pointcloud::frame::{TICKS_PER_M, ticks_from_world, world_from_ticks};
 use timberline_pointcloud::{Column, Frame, PointCloud};
 
 /// Higher levels gain next to nothing on such data and cost several times as much.
@@ -25,9 +25,9 @@ pub(crate) fn max_points(extra_columns: usize) -> usize {
 /// Columns of optional attributes that hold nothing but zeros here are left out.
 pub(crate) fn encode(cloud: &PointCloud, optional: &[&str]) -> Result<Vec<u8>, String> {
     let mut out = Vec::with_capacity(cloud.len() * 34 + 64);
-    put(&mut out, [&(cloud.len() as u32)].into_iter().map(|v| v.to_le_bytes()));
+    out.extend((cloud.len() as u32).to_le_bytes());
     for axis in [&cloud.x, &cloud.y, &cloud.z] {
-        let ticks = axis.iter().map(|metres| (metres * TICKS_PER_M).round() as i32);
+        let ticks = axis.iter().map(|metres| ticks_from_world(*metres) as i32);
         put(&mut out, Deltas { last: 0, values: ticks });
     }
     put(&mut out, cloud.intensity.iter().map(|v| v.to_le_bytes()));
@@ -78,8 +78,7 @@ fn unpack(bytes: &[u8]) -> Result<Vec<u8>, String> {
 /// Decodes points into a frame with the tile's corner as origin.
 pub(crate) fn decode(bytes: &[u8], frame: Frame) -> Result<PointCloud, String> {
     let raw = unpack(bytes)?;
-    let mut input = Input { rest: &raw, len: 1 };
-    input.len = u32::from_le_bytes(input.column::<4>()?.first().copied().ok_or("empty")?) as usize;
+    let mut input = Input::new(&raw)?;
     let mut cloud = PointCloud::new(frame);
     // The world coordinate is the nearest f64 to its tick; local ones are exact differences of it.
     let origin = frame.origin_m;
@@ -125,8 +124,7 @@ pub(crate) fn encode_voxels(counts: &[(Voxel, u32)]) -> Result<Vec<u8>, String> 
 /// Decodes voxel counts.
 pub(crate) fn decode_voxels(bytes: &[u8]) -> Result<Vec<(Voxel, u32)>, String> {
     let raw = unpack(bytes)?;
-    let mut input = Input { rest: &raw, len: 1 };
-    input.len = u32::from_le_bytes(input.column::<4>()?.first().copied().ok_or("empty")?) as usize;
+    let mut input = Input::new(&raw)?;
     let (x, y, z) = (input.ticks()?, input.ticks()?, input.ticks()?);
     let counts = input.values(u32::from_le_bytes)?;
     let places = x.into_iter().zip(y).zip(z).map(|((x, y), z)| [x, y, z]);
@@ -194,6 +192,12 @@ struct Input<'a> {
 }
 
 impl<'a> Input<'a> {
+    /// Columns of the length that stands in front of them.
+    fn new(raw: &'a [u8]) -> Result<Self, String> {
+        let (len, rest) = raw.split_first_chunk::<4>().ok_or("no number of values")?;
+        Ok(Self { rest, len: u32::from_le_bytes(*len) as usize })
+    }
+
     fn take(&mut self, count: usize) -> Result<&'a [u8], String> {
         if count > self.rest.len() {
             return Err(format!("{count} bytes expected, {} left", self.rest.len()));
