@@ -28,7 +28,6 @@
 
 pub mod cells;
 pub mod classify;
-pub mod coverage;
 pub mod dense;
 pub mod error;
 pub mod hardy;

@@ -162,9 +162,9 @@ pub struct DtmParams {
     /// Edge of the raster's cells.
     #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m"))]
     pub cell_m: f64,
-    /// How far from the nearest point of any class the raster goes on.
-    #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m"))]
-    pub rim_m: f64,
+    /// Widest gap in the points of any class across which the raster goes on; it ends with them.
+    #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "morphological closing, Serra 1982"))]
+    pub gap_m: f64,
 }
 
 impl Default for DtmParams {
@@ -179,12 +179,13 @@ impl Default for DtmParams {
             merge_m: 0.1,
             max_distance_m: 30.0,
             cell_m: 0.5,
-            rim_m: 5.0,
+            gap_m: 30.0,
         }
     }
 }
 
-/// log2 of the edge of the smallest patches: 0.5 m, half of which is a run of the world's curve.
+/// log2 of the edge of the smallest patches, 0.5 m: a run of the world's curve, as any square from
+/// the curve's own cell up.
 const LOG2_SMALLEST: i32 = -1;
 
 impl DtmParams {
@@ -223,12 +224,20 @@ impl DtmParams {
         2.0 * self.largest_patch_m
     }
 
-    /// How far beyond a rectangle ground points have a say in the surface over it, metres: the
-    /// bucket, the largest square whose weight reaches in, and how far that looks for nodes (the squares around
-    /// it that have a say in its kernel look less far).
+    /// Half the side of the square that closes gaps in the raster, cells.
+    #[must_use]
+    pub fn gap_cells(&self) -> u32 {
+        (self.gap_m / 2.0 / self.cell_m).ceil() as u32
+    }
+
+    /// How far beyond a rectangle points have a say in the terrain over it, metres. In the surface:
+    /// the bucket, the largest square whose weight reaches in, and how far that looks for nodes (the
+    /// squares around it that have a say in its kernel look less far). In where the raster shows it:
+    /// the closing's two squares and the cell of the border.
     #[must_use]
     pub fn reach_m(&self) -> f64 {
-        BUCKET_M + (BLEND_MARGIN + 1.0) * self.largest_patch_m + self.gather_m()
+        let surface = BUCKET_M + (BLEND_MARGIN + 1.0) * self.largest_patch_m + self.gather_m();
+        surface.max(f64::from(2 * self.gap_cells() + 1) * self.cell_m)
     }
 
     fn log2_root(&self) -> i32 {
@@ -244,6 +253,13 @@ mod tests {
     fn defaults_are_sound() {
         assert_eq!(GroundParams::default().check(), Vec::<String>::new());
         assert_eq!(DtmParams::default().check(), Vec::<String>::new());
+    }
+
+    #[test]
+    fn the_reach_holds_surface_and_gaps() {
+        assert_eq!(DtmParams::default().reach_m(), 54.0);
+        let wide = DtmParams { gap_m: 80.0, ..DtmParams::default() };
+        assert_eq!(wide.reach_m(), 80.5);
     }
 
     #[test]

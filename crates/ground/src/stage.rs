@@ -2,7 +2,6 @@
 //! model and heights above ground).
 
 use crate::classify::{Label, classify, region_of};
-use crate::coverage::covered;
 use crate::nodes::Cell;
 use crate::patch::Patch;
 use crate::{DtmParams, GroundParams, Hardy, Nodes, Surface};
@@ -11,7 +10,7 @@ use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
 use timberline_artefact::{Aligned, Kind, Raster, Surroundings, UnitKind, gather, read_header};
-use timberline_pointcloud::Rect;
+use timberline_pointcloud::{Rect, closing};
 
 /// Ground classification as a stage of a pipeline.
 #[derive(Debug, Clone, Copy)]
@@ -98,7 +97,7 @@ impl Stage for DtmStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "dtm",
-            version: 3,
+            version: 4,
             summary: "terrain by blended multiquadric patches (Hardy 1971) and heights above it",
             unit: UnitKind::Tile,
             inputs: DTM_INPUTS,
@@ -139,18 +138,25 @@ fn heights(all: &Surroundings, surface: &Surface) -> Vec<f32> {
     heights
 }
 
-/// Elevations at the centres of the tile's cells that lie near enough to a point.
+/// Elevations at the centres of the tile's cells with points and in the gaps between them.
 fn raster(all: &Surroundings, params: &DtmParams, surface: &Surface) -> Raster {
     let mut raster = Raster::covering(&all.tile_rect, params.cell_m);
-    let first = [raster.column0, raster.row0];
-    let size = [raster.columns as usize, raster.rows as usize];
-    let world = (0..all.cloud.len()).map(|i| all.cloud.world(i));
-    let covered = covered(world, first, size, params.cell_m, params.rim_m);
+    let window = raster.window();
+    let around = window.grown(2 * params.gap_cells());
+    let mut occupied = vec![false; around.len()];
+    for i in 0..all.cloud.len() {
+        let [x, y, _] = all.cloud.world(i);
+        let [column, row] = [x, y].map(|value| (value / params.cell_m).floor() as i64);
+        if around.contains(column, row) {
+            occupied[around.index(column, row)] = true;
+        }
+    }
+    let shown = closing::closed(&occupied, window, params.gap_cells());
+    let places: Vec<usize> = (0..raster.values.len()).filter(|i| shown[*i]).collect();
     let columns = raster.columns.max(1);
-    let near: Vec<usize> = (0..raster.values.len()).filter(|i| covered[*i]).collect();
     let centre = |&i: &usize| raster.centre(i as u32 % columns, i as u32 / columns);
-    let centres: Vec<[f64; 2]> = near.iter().map(centre).collect();
-    for (index, elevation) in near.into_iter().zip(surface.elevations(&centres)) {
+    let centres: Vec<[f64; 2]> = places.iter().map(centre).collect();
+    for (index, elevation) in places.into_iter().zip(surface.elevations(&centres)) {
         raster.values[index] = elevation;
     }
     raster

@@ -20,40 +20,15 @@ use timberline_pointcloud::{Frame, PointCloud, TileGrid, TileId};
 struct Outcome {
     /// Bits of the height, and whether it is ground, by position.
     points: BTreeMap<[i64; 3], (u32, bool)>,
-    /// Bits of the elevation by world cell.
+    /// Bits of the elevation by world cell that has one.
     cells: BTreeMap<[i64; 2], u64>,
-}
-
-fn tiles_of(store: &mut Alone, cloud: &PointCloud, grid: TileGrid) -> Vec<TileId> {
-    let tile_of = |i: u32| {
-        let [x, y, _] = cloud.world(i as usize);
-        grid.tile_at(x, y)
-    };
-    let mut tiles: Vec<TileId> = (0..cloud.len() as u32).map(tile_of).collect();
-    tiles.sort_unstable();
-    tiles.dedup();
-    for &tile in &tiles {
-        let own: Vec<u32> = (0..cloud.len() as u32).filter(|&i| tile_of(i) == tile).collect();
-        let part = cloud.select(&own);
-        let lowest = (0..part.len()).map(|i| part.world(i)[2]).fold(f64::INFINITY, f64::min);
-        let part = part.in_frame(PointTile::frame(&grid, tile, lowest));
-        let facts = Facts { frame: Some(part.frame), grid: Some(grid), ..Facts::default() };
-        let facts = facts.count("points", part.len());
-        store.put(UnitId::Tile(tile), &PointTile { cloud: part }, facts).unwrap();
-    }
-    tiles
-}
-
-fn file<K: Kind>(store: &Alone, tile: TileId) -> K {
-    let unit = UnitId::Tile(tile);
-    let found = store.files.iter().find(|file| file.kind == K::NAME && file.unit == unit).unwrap();
-    read(&found.path).unwrap().1
 }
 
 fn over_tiles(cloud: &PointCloud, grid: TileGrid) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign::default());
-    let tiles = tiles_of(&mut store, cloud, grid);
+    let tiles = store.put_tiles(cloud, grid).unwrap();
+    let tiles: Vec<TileId> = tiles.into_iter().map(|(tile, ..)| tile).collect();
     for tile in &tiles {
         store.run::<GroundStage>(UnitId::Tile(*tile), None, &GroundParams::default()).unwrap();
     }
@@ -76,7 +51,10 @@ fn collect(outcome: &mut Outcome, store: &Alone, tile: TileId) {
     for row in 0..raster.rows {
         for column in 0..raster.columns {
             let cell = [raster.column0 + i64::from(column), raster.row0 + i64::from(row)];
-            outcome.cells.insert(cell, raster.values[raster.index(column, row)].to_bits());
+            let elevation = raster.values[raster.index(column, row)];
+            if elevation.is_finite() {
+                outcome.cells.insert(cell, elevation.to_bits());
+            }
         }
     }
 }
@@ -87,14 +65,27 @@ fn cut_as_you_like() {
     let one = over_tiles(&cloud, TileGrid::new(256, [481_100, 3_812_950]).unwrap());
     let many = over_tiles(&cloud, TileGrid::new(50, [17, -9]).unwrap());
     assert_eq!(one.points, many.points);
-    for (cell, bits) in &many.cells {
-        // Whole tiles have cells beyond the points; those of one grid need not be in the other.
-        if let Some(other) = one.cells.get(cell) {
-            assert_eq!(bits, other, "cell {cell:?}");
-        }
-    }
+    assert_eq!(one.cells, many.cells);
     assert!(one.points.values().filter(|(_, is_ground)| *is_ground).count() > 4000);
     assert!(one.points.values().all(|(bits, _)| f32::from_bits(*bits).is_finite()));
+}
+
+/// A river of 24 m is narrower than the widest gap, a lake of 44 m is not.
+#[test]
+fn the_raster_spans_narrow_gaps_and_ends_with_the_points() {
+    for (water_m, spanned) in [(24.0, true), (44.0, false)] {
+        let dry = |p: &[f64; 3]| (p[0] - ORIGIN[0] - 60.0).abs() > water_m / 2.0;
+        let points: Vec<[f64; 3]> = forest(24_000, 120.0).into_iter().filter(dry).collect();
+        let cloud = cloud_of(&points, Frame::new([481_200, 3_813_000, 0]));
+        let found = over_tiles(&cloud, TileGrid::new(64, [481_180, 3_812_980]).unwrap());
+        let has_value = |x: f64, y: f64| {
+            let cell = [ORIGIN[0] + x, ORIGIN[1] + y].map(|v| (v / 0.5).floor() as i64);
+            found.cells.contains_key(&cell)
+        };
+        assert!(has_value(20.2, 60.2) && has_value(100.2, 60.2));
+        assert_eq!(has_value(60.2, 60.2), spanned, "{water_m} m of water");
+        assert!(!has_value(-1.0, 60.2) && !has_value(60.2, 121.0));
+    }
 }
 
 #[test]
