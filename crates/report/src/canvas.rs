@@ -4,6 +4,7 @@ use crate::Error;
 use crate::colour::{Rgb, mix};
 use image::codecs::png::{CompressionType, FilterType, PngEncoder};
 use image::{ExtendedColorType, ImageEncoder};
+use rayon::prelude::*;
 use std::path::Path;
 
 /// Rows of pixels from the top left. Positions are in pixels; the middle of the first is (0.5, 0.5).
@@ -74,6 +75,17 @@ impl Canvas {
         let inside =
             (0..i64::from(self.width)).contains(&x) && (0..i64::from(self.height)).contains(&y);
         inside.then(|| y as usize * self.width as usize + x as usize)
+    }
+
+    /// The rows from `first` on, `count` of them, in bands of `height` rows (the last may be lower).
+    pub(crate) fn bands(
+        &mut self,
+        first: usize,
+        count: usize,
+        height: usize,
+    ) -> impl IndexedParallelIterator<Item = &mut [Rgb]> {
+        let width = self.width as usize;
+        self.pixels[first * width..(first + count) * width].par_chunks_mut(height * width)
     }
 
     /// Paints a rectangle given by two corners, edges rounded to whole pixels.

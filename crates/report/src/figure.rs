@@ -13,6 +13,8 @@ use timberline_pointcloud::Rect;
 pub const LONGEST_PX: f64 = 3200.0;
 /// What a small map is enlarged to.
 const SHORTEST_PX: f64 = 1400.0;
+/// Rows of pixels that are painted together.
+const BAND_PX: usize = 64;
 /// Width of the legend and least height of a page, in text heights.
 const LEGEND_WIDTH: f64 = 13.5;
 const LEGEND_HEIGHT: f64 = 25.0;
@@ -130,27 +132,30 @@ impl<'a> Figure<'a> {
         ]
     }
 
-    /// Paints the map pixel by pixel, rows side by side: `colour` tells that of a world position.
-    pub fn paint(&mut self, colour: impl Fn([f64; 2]) -> Rgb + Sync) {
+    /// Paints the map pixel by pixel in bands, side by side: `prepare` gets the world's y at the
+    /// southern and northern row of a band and returns what tells the colour of a position between.
+    pub fn paint<C: Fn([f64; 2]) -> Rgb>(&mut self, prepare: impl Fn([f64; 2]) -> C + Sync) {
         let (corner, scale, height) = (self.page.extent.min, self.px_per_m, self.height);
-        let columns = self.width as u32;
-        let row = |row: u32| -> Vec<Rgb> {
-            let y = corner[1] + (height - f64::from(row) - 0.5) / scale;
-            let x = |column: u32| corner[0] + (f64::from(column) + 0.5) / scale;
-            (0..columns).map(|column| colour([x(column), y])).collect()
-        };
-        let rows: Vec<Vec<Rgb>> = (0..height as u32).into_par_iter().map(row).collect();
-        for (row, colours) in rows.iter().enumerate() {
-            for (column, colour) in colours.iter().enumerate() {
-                let (x, y) = (column as i64 + self.left as i64, row as i64 + self.top as i64);
-                self.canvas.blend(x, y, Paint::solid(*colour), 1.0);
-            }
-        }
+        let (left, columns, rows) = (self.left as usize, self.width as usize, height as usize);
+        let x = |column: usize| corner[0] + (column as f64 + 0.5) / scale;
+        let y = |row: usize| corner[1] + (height - row as f64 - 0.5) / scale;
+        let width = self.canvas.width() as usize;
+        self.canvas.bands(self.top as usize, rows, BAND_PX).enumerate().for_each(
+            |(band, pixels)| {
+                let first = band * BAND_PX;
+                let colour = prepare([y(first + pixels.len() / width - 1), y(first)]);
+                for (row, pixels) in pixels.chunks_mut(width).enumerate() {
+                    let y = y(first + row);
+                    let pixels = pixels[left..left + columns].iter_mut().enumerate();
+                    pixels.for_each(|(column, pixel)| *pixel = colour([x(column), y]));
+                }
+            },
+        );
     }
 
     /// Fills the map with the colour of missing data.
     pub fn clear(&mut self) {
-        self.paint(|_| NO_DATA);
+        self.paint(|_| |_| NO_DATA);
     }
 
     /// Adds everything around the map and returns the picture. What was drawn beyond the frame

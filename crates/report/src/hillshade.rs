@@ -5,29 +5,34 @@
 //! horizon, each weighted by how obliquely it strikes the slope.
 
 use crate::Grid;
+use timberline_pointcloud::Window;
 
 /// Azimuths of the lights, degrees clockwise from north.
 const AZIMUTHS_DEG: [f64; 4] = [225.0, 270.0, 315.0, 360.0];
 /// Height of the lights above the horizon, degrees.
 const ALTITUDE_DEG: f64 = 30.0;
 
-/// Light on every cell, 0 to 1 (level ground: 0.5); NaN where the surface has no value.
+/// Light on the cells of a window of a surface, 0 to 1 (level ground: 0.5); NaN where the surface has
+/// no value.
 ///
 /// `exaggeration` multiplies heights. Slopes are those of Horn (1981, Proceedings of the IEEE 69),
 /// missing neighbours taken level with the cell.
 #[must_use]
-pub fn hillshade(surface: &Grid, exaggeration: f64) -> Vec<f32> {
-    let window = surface.window;
-    let mut light = Vec::with_capacity(window.len());
+pub fn hillshade(surface: &Grid, exaggeration: f64, window: Window) -> Grid {
+    let (lights, height) = (AZIMUTHS_DEG.map(direction), direction(ALTITUDE_DEG));
+    let mut values = Vec::with_capacity(window.len());
     for row in window.row0..window.end_row() {
         for column in window.column0..window.end_column() {
-            light.push(match slopes(surface, column, row) {
-                Some([east, north]) => shade(east * exaggeration, north * exaggeration) as f32,
-                None => f32::NAN,
-            });
+            let slope = slopes(surface, column, row).map(|slope| slope.map(|s| s * exaggeration));
+            values.push(slope.map_or(f32::NAN, |slope| shade(slope, &lights, height) as f32));
         }
     }
-    light
+    Grid { cell_m: surface.cell_m, window, values }
+}
+
+/// Sine and cosine of an angle in degrees.
+fn direction(degrees: f64) -> [f64; 2] {
+    libm::sincos(degrees.to_radians()).into()
 }
 
 /// By how much heights are best multiplied: so that slopes that only a tenth of the cells exceed are
@@ -56,14 +61,12 @@ fn slopes(surface: &Grid, column: i64, row: i64) -> Option<[f64; 2]> {
     Some([east / (8.0 * surface.cell_m), north / (8.0 * surface.cell_m)])
 }
 
-/// Light on a slope.
-fn shade(east: f64, north: f64) -> f64 {
+/// Light on a slope, from lights by sine and cosine of their azimuths and of their common height.
+fn shade([east, north]: [f64; 2], lights: &[[f64; 2]], [sine, cosine]: [f64; 2]) -> f64 {
     let steepness2 = east * east + north * north;
-    let (sine, cosine) = libm::sincos(ALTITUDE_DEG.to_radians());
     let cos_slope = 1.0 / (1.0 + steepness2).sqrt();
     let (mut light, mut weights) = (0.0, 0.0);
-    for azimuth in AZIMUTHS_DEG {
-        let (to_east, to_north) = libm::sincos(azimuth.to_radians());
+    for [to_east, to_north] in lights {
         // Cosine of the angle between the light and the surface's normal.
         let towards = -(east * to_east + north * to_north);
         let incidence = (cos_slope * (sine + cosine * towards)).clamp(0.0, 1.0);
@@ -79,7 +82,6 @@ fn shade(east: f64, north: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use timberline_pointcloud::Window;
 
     fn plane(east: f64, north: f64) -> Grid {
         let window = Window { column0: -2, row0: 7, columns: 5, rows: 4 };
@@ -108,13 +110,13 @@ mod tests {
 
     #[test]
     fn slopes_towards_the_north_west_are_light() {
-        let middle = |east, north| hillshade(&plane(east, north), 1.0)[7];
+        let middle = |east, north| {
+            let plane = plane(east, north);
+            hillshade(&plane, 1.0, plane.window).values[7]
+        };
         assert!((middle(0.0, 0.0) - 0.5).abs() < 1e-6);
         assert!(middle(0.5, -0.5) > 0.55 && middle(-0.5, 0.5) < 0.3);
-        assert!(
-            hillshade(&Grid::empty(Window { column0: 0, row0: 0, columns: 1, rows: 1 }, 1.0), 1.0)
-                [0]
-            .is_nan()
-        );
+        let window = Window { column0: 0, row0: 0, columns: 1, rows: 1 };
+        assert!(hillshade(&Grid::empty(window, 1.0), 1.0, window).values[0].is_nan());
     }
 }

@@ -6,7 +6,7 @@ use crate::figure::{Entry, Figure, Page, Symbol, draw_symbol};
 use crate::hillshade::{exaggeration, hillshade};
 use crate::{Error, Grid};
 use timberline_artefact::Crs;
-use timberline_pointcloud::Rect;
+use timberline_pointcloud::{Rect, Window};
 
 /// Heights between which the canopy's colour covers the relief, metres.
 const COVER_M: [f64; 2] = [0.5, 2.0];
@@ -56,7 +56,6 @@ pub struct MapContents<'a> {
 pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
     let MapContents { extent, terrain, canopy, .. } = contents;
     let top = canopy.range(LEFT_OUT).map_or(1.0, |[_, high]| high.max(1.0));
-    let canopy = &without_pits(canopy);
     let steepening = exaggeration(terrain);
     let mut figure = Figure::new(Page {
         title: contents.title,
@@ -66,29 +65,38 @@ pub fn draw(contents: &MapContents<'_>) -> Result<Canvas, Error> {
         crs: contents.crs,
         legend: legend(top, !contents.trees.is_empty(), steepening),
     })?;
-    let light = Light { terrain: relief(terrain, steepening), canopy: relief(canopy, 1.0) };
-    figure.paint(|at| pixel(at, canopy, &light, top));
+    // What is seen of the surfaces is made band by band: for a whole map it is larger than they are.
+    figure.paint(|rows| {
+        let drawn = without_pits(canopy, canopy.rows_around(rows, 1));
+        let light = Light {
+            terrain: hillshade(terrain, steepening, terrain.rows_around(rows, 0)),
+            canopy: hillshade(&drawn, 1.0, canopy.rows_around(rows, 0)),
+        };
+        move |at| pixel(at, &drawn, &light, top)
+    });
     draw_crowns(&mut figure, contents.trees);
     draw_tops(&mut figure, contents.trees);
     Ok(figure.finish())
 }
 
-/// The canopy as it is drawn: a cell far below most of its neighbours (a pulse that went through a
+/// The cells of a window of the canopy as they are drawn: a cell far below most of its neighbours (a pulse that went through a
 /// crown, Khosravipour et al. 2014, PE&RS 80(9)) takes their median.
-fn without_pits(canopy: &Grid) -> Grid {
+fn without_pits(canopy: &Grid, window: Window) -> Grid {
     const PIT_M: f64 = 4.0;
-    let window = canopy.window;
-    let mut drawn = canopy.clone();
+    let mut drawn = Grid::empty(window, canopy.cell_m);
     for row in window.row0..window.end_row() {
         for column in window.column0..window.end_column() {
             let Some(own) = canopy.get(column, row) else { continue };
             let around = (-1..=1).flat_map(|dr| (-1..=1).map(move |dc| (column + dc, row + dr)));
-            let mut heights: Vec<f64> = around.filter_map(|(c, r)| canopy.get(c, r)).collect();
-            heights.sort_by(f64::total_cmp);
-            let median = heights[(heights.len() - 1) / 2];
-            if own < median - PIT_M {
-                drawn.values[window.index(column, row)] = median as f32;
+            let (mut heights, mut count) = ([0.0; 9], 0);
+            for height in around.filter_map(|(c, r)| canopy.get(c, r)) {
+                heights[count] = height;
+                count += 1;
             }
+            heights[..count].sort_unstable_by(f64::total_cmp);
+            let median = heights[(count - 1) / 2];
+            let height = if own < median - PIT_M { median } else { own };
+            drawn.values[window.index(column, row)] = height as f32;
         }
     }
     drawn
@@ -113,10 +121,6 @@ fn legend(top: f64, has_trees: bool, steepening: f64) -> Vec<Entry> {
 struct Light {
     terrain: Grid,
     canopy: Grid,
-}
-
-fn relief(surface: &Grid, steepening: f64) -> Grid {
-    Grid { values: hillshade(surface, steepening), cell_m: surface.cell_m, window: surface.window }
 }
 
 /// The colour of ground in a light from 0 to 1.
@@ -167,7 +171,6 @@ fn draw_tops(figure: &mut Figure<'_>, trees: &[MapTree]) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use timberline_pointcloud::Window;
 
     #[test]
     fn pits_are_closed_and_edges_stay() {
@@ -177,7 +180,7 @@ mod tests {
         for row in 0..3 {
             values[row * 5] = 0.0;
         }
-        let drawn = without_pits(&Grid { cell_m: 0.5, window, values });
+        let drawn = without_pits(&Grid { cell_m: 0.5, window, values }, window);
         assert_eq!(drawn.values[7], 20.0);
         assert_eq!([drawn.values[0], drawn.values[5], drawn.values[10]], [0.0, 0.0, 0.0]);
     }

@@ -50,13 +50,14 @@ pub fn raster(heading: &Heading<'_>, grid: &Grid, meaning: &str) -> Result<Canva
         min: [edge(window.column0), edge(window.row0)],
         max: [edge(window.end_column()), edge(window.end_row())],
     };
-    let light = Grid { values: hillshade(grid, 1.0), ..grid.clone() };
+    let light = hillshade(grid, 1.0, window);
     let mut figure = Figure::new(heading.page(extent, grid.cell_m, legend))?;
-    figure.paint(|at| {
+    let colour = |at| {
         let Some(value) = grid.sample(at) else { return NO_DATA };
         let shade = 0.3 + 1.4 * light.sample(at).unwrap_or(0.5);
         lit(CIVIDIS.at((value - low) / (high - low)), shade)
-    });
+    };
+    figure.paint(|_| colour);
     Ok(figure.finish())
 }
 

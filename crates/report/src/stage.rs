@@ -313,7 +313,7 @@ impl Layers {
     fn fill(&mut self) {
         let window = self.canopy.window;
         let mut around = Grid::empty(window.grown(FILL_CELLS), self.canopy.cell_m);
-        around.raise(window, &self.canopy.values);
+        around.raise(window, &std::mem::take(&mut self.canopy.values));
         self.canopy.values = gridding::fill_gaps(&around.values, window, FILL_CELLS);
     }
 
