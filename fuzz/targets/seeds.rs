@@ -8,17 +8,16 @@ use std::path::Path;
 
 const WKT: &str = r#"PROJCS["NAD83 / UTM 10N",GEOGCS["NAD83",UNIT["degree",0.0174]],UNIT["metre",1],AUTHORITY["EPSG","26910"]]"#;
 
-/// Writes one file of every version and point format unless the folder is there.
+/// Writes one file of every version and point format, where the folder does not hold it yet.
 pub fn write(folder: &Path) -> Result<(), Box<dyn Error>> {
-    if folder.exists() {
-        return Ok(());
-    }
     std::fs::create_dir_all(folder)?;
     for (minor, formats) in [(0u8, 0..=1u8), (2, 0..=3), (3, 4..=5), (4, 6..=10)] {
         for format in formats {
             for compressed in [false, true] {
-                let name = format!("1{minor}-{format}-{compressed}");
-                std::fs::write(folder.join(name), file(minor, format, compressed)?)?;
+                let path = folder.join(format!("1{minor}-{format}-{compressed}"));
+                if !path.exists() {
+                    std::fs::write(path, file(minor, format, compressed)?)?;
+                }
             }
         }
     }

@@ -1,7 +1,7 @@
 //! Raw point records to columns.
 
 use crate::extra::{ExtraField, Raw};
-use crate::format::{INTENSITY, Layout, XYZ};
+use crate::format::{INTENSITY, Layout, USER_DATA, XYZ};
 use crate::header::Header;
 use timberline_artefact::Crs;
 use timberline_pointcloud::frame::{MAX_COORDINATE_M, ticks_from_world, world_from_ticks};
@@ -109,7 +109,7 @@ impl Decoder {
             Some(at) => self.raw(records, at).values(f64::from_le_bytes),
             None => vec![f64::NAN; cloud.x.len()],
         };
-        let user = self.raw(records, self.layout.user_data()).values(|[b]| b);
+        let user = self.raw(records, USER_DATA).values(|[b]| b);
         cloud.extra.insert("user_data".to_owned(), Column::U8(user));
     }
 

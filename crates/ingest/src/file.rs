@@ -18,7 +18,6 @@ pub struct LasFile {
     header: Header,
     crs: Crs,
     extra: Vec<ExtraField>,
-    is_copc: bool,
     notes: Notes,
     reader: PointReader,
     decoder: Decoder,
@@ -36,11 +35,7 @@ impl LasFile {
     /// [`Error::File`] naming the file and what is wrong with it.
     pub fn open(path: &Path, units: UnitChoice, crs: Option<&Crs>) -> Result<Self, Error> {
         let open = || {
-            let file = File::open(path).map_err(Error::io("the file"))?;
-            let is_file = file.metadata().is_ok_and(|metadata| metadata.is_file());
-            if !is_file {
-                return Err(Error::Foreign { found: "a folder or device".to_owned() });
-            }
+            let file = open_file(path)?;
             Self::from_source(Box::new(file), units, crs)
         };
         open().map_err(|error| error.in_file(path))
@@ -56,12 +51,7 @@ impl LasFile {
         crs: Option<&Crs>,
     ) -> Result<Self, Error> {
         let mut notes = Notes::default();
-        let header = Header::read(source.as_mut(), &mut notes)?;
-        let records = Records::read(source.as_mut(), &header, &mut notes)?;
-        let crs = match crs {
-            Some(given) => given.clone(),
-            None => crs_of(&header, &records, units, &mut notes)?,
-        };
+        let (header, records, crs) = read_head(source.as_mut(), units, crs, &mut notes)?;
         note_header(&header, &crs, &mut notes);
         let (from, to) = (usize::from(header.layout.len), usize::from(header.record_len));
         let extra = extra::fields(&records.extra_bytes, from, to, &mut notes);
@@ -71,7 +61,6 @@ impl LasFile {
             header,
             crs,
             extra,
-            is_copc: records.copc,
             notes,
             reader,
             decoder,
@@ -97,12 +86,6 @@ impl LasFile {
     #[must_use]
     pub fn extra(&self) -> &[ExtraField] {
         &self.extra
-    }
-
-    /// Whether it is a COPC file.
-    #[must_use]
-    pub fn is_copc(&self) -> bool {
-        self.is_copc
     }
 
     /// What a reader should know, so far.
@@ -151,6 +134,31 @@ impl LasFile {
             expected: self.header.points,
         })
     }
+}
+
+/// Opens what is a file and no folder or device.
+pub(crate) fn open_file(path: &Path) -> Result<File, Error> {
+    let file = File::open(path).map_err(Error::io("the file"))?;
+    if file.metadata().is_ok_and(|metadata| metadata.is_file()) {
+        return Ok(file);
+    }
+    Err(Error::Foreign { found: "a folder or device".to_owned() })
+}
+
+/// Reads what precedes the points; a CRS that is given replaces the file's.
+pub(crate) fn read_head(
+    source: &mut dyn Source,
+    units: UnitChoice,
+    crs: Option<&Crs>,
+    notes: &mut Notes,
+) -> Result<(Header, Records, Crs), Error> {
+    let header = Header::read(source, notes)?;
+    let records = Records::read(source, &header, notes)?;
+    let crs = match crs {
+        Some(given) => given.clone(),
+        None => crs_of(&header, &records, units, notes)?,
+    };
+    Ok((header, records, crs))
 }
 
 fn note_header(header: &Header, crs: &Crs, notes: &mut Notes) {

@@ -25,6 +25,8 @@ pub struct Layout {
 pub(crate) const XYZ: [usize; 3] = [0, 4, 8];
 /// Bytes 12 and 13 hold the intensity in every format.
 pub(crate) const INTENSITY: usize = 12;
+/// Byte 17 holds the user data in every format.
+pub(crate) const USER_DATA: usize = 17;
 
 impl Layout {
     /// The layout of a format; `None` above 10.
@@ -45,12 +47,6 @@ impl Layout {
             _ => return None,
         };
         Some(Self { format, len, extended: format >= 6, gps_time, rgb, nir, waveform })
-    }
-
-    /// Where the user data byte stands.
-    #[must_use]
-    pub fn user_data(&self) -> usize {
-        17
     }
 
     /// Where the point source id stands.

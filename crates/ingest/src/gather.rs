@@ -2,7 +2,6 @@
 
 use crate::params::TilesParams;
 use crate::rules::{self, Dropped};
-use crate::scatter::widen;
 use crate::segment;
 use crate::shard::{Section, Sections, ShardReader};
 use crate::voxels::{self, Isolation, voxel_of};
@@ -50,7 +49,7 @@ pub fn gather<S: Sections>(
     let mut dropped = Dropped::default();
     let mut given = 0;
     for shard in shards.iter_mut() {
-        for section in sections_of(shard, tile) {
+        for section in shard.index().sections_of(|of| of == tile) {
             let part = read_section(shard, &section, cloud.frame)?;
             given += part.len() as u64;
             append(&mut cloud, rules::apply(part, params, &mut dropped), &mut notes)?;
@@ -84,7 +83,7 @@ fn check_same<S: Sections>(grid: TileGrid, shards: &[ShardReader<S>]) -> Result<
 
 /// The system of the files with points in the tile. The first by name wins where they differ.
 fn common_crs<S: Sections>(shards: &[ShardReader<S>], tile: TileId, notes: &mut Notes) -> Crs {
-    let holds = |shard: &&ShardReader<S>| shard.index().sections.iter().any(|s| s.tile == tile);
+    let holds = |shard: &&ShardReader<S>| shard.index().holds(tile);
     let mut known: Vec<&Crs> = shards
         .iter()
         .filter(holds)
@@ -108,10 +107,6 @@ fn common_crs<S: Sections>(shards: &[ShardReader<S>], tile: TileId, notes: &mut 
     first.unwrap_or_else(|| {
         shards.iter().find(holds).map(|shard| shard.index().crs.clone()).unwrap_or_default()
     })
-}
-
-fn sections_of<S: Sections>(shard: &ShardReader<S>, tile: TileId) -> Vec<Section> {
-    shard.index().sections.iter().filter(|section| section.tile == tile).copied().collect()
 }
 
 fn read_section<S: Sections>(
@@ -142,13 +137,18 @@ fn append(cloud: &mut PointCloud, mut part: PointCloud, notes: &mut Notes) -> Re
     cloud.append(&part).map_err(Error::from)
 }
 
+/// Makes a column of `f64` of any column.
+fn widen(column: &Column) -> Column {
+    Column::F64((0..column.len()).map(|index| column.value(index)).collect())
+}
+
 /// Adds the columns that a file has elsewhere: which columns a tile has does not depend on where
 /// in it their values are zero.
 fn add_columns<S: Sections>(cloud: &mut PointCloud, shards: &[ShardReader<S>], tile: TileId) {
     let len = cloud.len();
     for shard in shards {
         let index = shard.index();
-        if !index.sections.iter().any(|section| section.tile == tile) {
+        if !index.holds(tile) {
             continue;
         }
         for name in &index.columns {
@@ -171,8 +171,7 @@ fn neighbourhood<S: Sections>(
         |v: &voxels::Voxel| (0..2).all(|axis| v[axis] >= low[axis] && v[axis] <= high[axis]);
     let mut counts = Vec::new();
     for shard in shards {
-        let sections: Vec<Section> = shard.index().sections.clone();
-        for section in sections.iter().filter(|section| near.binary_search(&section.tile).is_ok()) {
+        for section in shard.index().sections_of(|tile| near.binary_search(&tile).is_ok()) {
             let bytes = shard.part(section.tile, section.voxels)?;
             let found = segment::decode_voxels(&bytes).map_err(|problem| Error::Shard {
                 tile: format!("tile {}", section.tile),

@@ -3,11 +3,10 @@
 //! Ritter and Ruth, GeoTIFF 1.0, section 2.4 and appendix 6; in LAS the three TIFF tags are the
 //! records 34735 to 34737.
 
-use crate::crs::UnitChoice;
-use crate::crs::{Said, exact_unit};
+use crate::crs::{Said, UnitChoice, exact_unit};
 use crate::epsg::{self, INTERNATIONAL_FOOT_M, US_SURVEY_FOOT_M};
 use crate::params::LengthUnit;
-use crate::vlr::Records;
+use crate::vlr::{GEO_ASCII, GEO_DOUBLES, Records};
 use crate::{Error, Notes};
 use std::collections::BTreeMap;
 
@@ -24,8 +23,6 @@ const VERTICAL_UNITS: u16 = 4099;
 const MODEL_GEOGRAPHIC: u16 = 2;
 const MODEL_GEOCENTRIC: u16 = 3;
 const USER_DEFINED: u16 = 32767;
-const DOUBLES: u16 = 34736;
-const ASCII: u16 = 34737;
 /// EPSG codes of units of length lie in this range.
 const EPSG_UNITS: std::ops::RangeInclusive<u16> = 9001..=9099;
 
@@ -84,12 +81,12 @@ impl GeoKeys {
     }
 
     fn double(&self, key: u16) -> Option<f64> {
-        let entry = self.entries.get(&key).filter(|entry| entry.location == DOUBLES)?;
+        let entry = self.entries.get(&key).filter(|entry| entry.location == GEO_DOUBLES)?;
         self.doubles.get(usize::from(entry.value)).copied()
     }
 
     fn text(&self, key: u16) -> Option<String> {
-        let entry = self.entries.get(&key).filter(|entry| entry.location == ASCII)?;
+        let entry = self.entries.get(&key).filter(|entry| entry.location == GEO_ASCII)?;
         let from = usize::from(entry.value);
         let to = (from + usize::from(entry.count)).min(self.ascii.len());
         let text = String::from_utf8_lossy(self.ascii.get(from..to)?);

@@ -6,6 +6,8 @@
 use crate::format::Layout;
 use crate::source::Source;
 use crate::{Error, Notes};
+use timberline_artefact::Crs;
+use timberline_pointcloud::Bounds3;
 
 /// Bytes of the smallest header (LAS 1.0 to 1.2).
 pub const MIN_HEADER_LEN: u64 = 227;
@@ -98,12 +100,6 @@ impl Header {
         self.global_encoding & WKT_BIT != 0
     }
 
-    /// Bytes behind the fields the format names.
-    #[must_use]
-    pub fn extra_len(&self) -> usize {
-        usize::from(self.record_len - self.layout.len)
-    }
-
     /// For uncompressed files: how many whole records there is room for.
     #[must_use]
     pub fn points_that_fit(&self) -> u64 {
@@ -122,6 +118,12 @@ impl Header {
         let [min, max] = self.bounds;
         let sane = (0..3).all(|a| min[a].is_finite() && max[a].is_finite() && min[a] <= max[a]);
         sane.then_some(self.bounds)
+    }
+
+    /// As [`Header::stated_bounds`] in the world, metres.
+    pub(crate) fn stated_bounds_m(&self, crs: &Crs) -> Option<Bounds3> {
+        let [min, max] = self.stated_bounds()?.map(|corner| crs.world_from_crs(corner));
+        Some(Bounds3 { min, max })
     }
 }
 

@@ -43,11 +43,9 @@ pub(crate) enum Plan {
 /// LASzip's record, checked against the header.
 #[derive(Debug, Clone)]
 pub(crate) struct Laszip {
-    items: Vec<LazItem>,
     vlr: LazVlr,
     layered: bool,
     compressor: u16,
-    chunk_size: u32,
 }
 
 /// A decompressor of one run of points.
@@ -88,14 +86,12 @@ impl Laszip {
         let vlr = contained(|| LazVlr::from_buffer(&data.bytes))
             .map_err(|panic| refuse(data, panic))?
             .map_err(|error| refuse(data, error.to_string()))?;
-        let chunk_size = vlr.chunk_size();
-        let items = vlr.items().clone();
-        let layered = check_items(&items, header).map_err(|problem| refuse(data, problem))?;
+        let layered = check_items(vlr.items(), header).map_err(|problem| refuse(data, problem))?;
         let fits = matches!((compressor, layered), (1 | 2, false) | (3, true));
         if !fits {
             return Err(refuse(data, format!("compressor {compressor} does not fit its items")));
         }
-        Ok(Self { items, vlr, layered, compressor, chunk_size })
+        Ok(Self { vlr, layered, compressor })
     }
 
     /// Finds out where the points are.
@@ -124,11 +120,11 @@ impl Laszip {
         if self.layered {
             return self.walk(source, header).map(Plan::Chunks);
         }
-        if self.chunk_size == VARIABLE {
+        if self.vlr.chunk_size() == VARIABLE {
             let record = RecordData { at: data, bytes: Vec::new() };
             return Err(refuse(&record, "chunks of variable size without a usable chunk table"));
         }
-        Ok(Plan::Stream { at: data + TABLE_OFFSET_LEN, restart: u64::from(self.chunk_size) })
+        Ok(Plan::Stream { at: data + TABLE_OFFSET_LEN, restart: u64::from(self.vlr.chunk_size()) })
     }
 
     /// Reads the chunk table; the message says why it cannot be used.
@@ -145,10 +141,11 @@ impl Laszip {
         }
         let mut bytes = vec![0; (end - table).min(16 + 16 * count) as usize];
         source.read_at(table, &mut bytes, "the chunk table").map_err(|error| error.to_string())?;
-        let variable = self.chunk_size == VARIABLE;
+        let chunk_size = self.vlr.chunk_size();
+        let variable = chunk_size == VARIABLE;
         let read = || ChunkTable::read(&mut Cursor::new(bytes), variable);
         let entries = contained(read)?.map_err(|error| error.to_string())?;
-        let size = |points: u64| if variable { points } else { u64::from(self.chunk_size) };
+        let size = |points: u64| if variable { points } else { u64::from(chunk_size) };
         let entries = entries.as_ref().iter().map(|e| (e.byte_count, size(e.point_count)));
         place_chunks(entries, data, table, header.points)
     }
@@ -182,7 +179,7 @@ impl Laszip {
             LazItemType::Byte14(count) => usize::from(count),
             _ => 1,
         };
-        self.items.iter().map(layers).sum()
+        self.vlr.items().iter().map(layers).sum()
     }
 
     /// Number of points and bytes of all layers, from a chunk's head.

@@ -71,7 +71,7 @@ impl Observed {
                 self.ground += 1;
                 self.ground_near_zero += u64::from(z.abs() < NEAR_ZERO_M);
             }
-            if !crate::voxels::is_company(cloud.classification[index], cloud.flags[index]) {
+            if !crate::rules::is_company(cloud.classification[index], cloud.flags[index]) {
                 continue;
             }
             let cell =

@@ -34,6 +34,15 @@ impl Dropped {
     }
 }
 
+/// Whether a point counts as company for others: neither withheld nor called noise by the supplier.
+pub(crate) fn is_company(classification: u8, flags: u8) -> bool {
+    flags & WITHHELD == 0 && !is_noise(classification)
+}
+
+fn is_noise(classification: u8) -> bool {
+    matches!(classification, LOW_NOISE | HIGH_NOISE)
+}
+
 /// Keeps the points that no rule about flags and classes leaves out.
 pub(crate) fn apply(cloud: PointCloud, params: &TilesParams, dropped: &mut Dropped) -> PointCloud {
     let mut kept = Vec::with_capacity(cloud.len());
@@ -41,7 +50,7 @@ pub(crate) fn apply(cloud: PointCloud, params: &TilesParams, dropped: &mut Dropp
         let (class, flags) = (cloud.classification[index], cloud.flags[index]);
         if params.drop_withheld && flags & WITHHELD != 0 {
             dropped.withheld += 1;
-        } else if params.drop_noise && matches!(class, LOW_NOISE | HIGH_NOISE) {
+        } else if params.drop_noise && is_noise(class) {
             dropped.noise += 1;
         } else if params.overlap == Overlap::Drop
             && (flags & OVERLAP != 0 || class == CLASS_OVERLAP)

@@ -10,7 +10,7 @@ use crate::{Error, Notes};
 use std::collections::BTreeMap;
 use std::io::Write;
 use timberline_artefact::Crs;
-use timberline_pointcloud::{Bounds3, Column, Frame, PointCloud, Rect, TileGrid, TileId};
+use timberline_pointcloud::{Column, Frame, PointCloud, Rect, TileGrid, TileId};
 
 /// Points kept in buffers: some 70 MB. The largest buffers are written when there are more.
 const BUFFERED_POINTS: usize = 1 << 20;
@@ -54,7 +54,7 @@ pub fn scatter<W: Write>(
     mut progress: impl FnMut(u64) -> Result<(), Error>,
 ) -> Result<(W, Scattered), Error> {
     let mut buckets = Buckets::new(grid, out);
-    let mut observed = Observed::new(stated_bounds(&file));
+    let mut observed = Observed::new(file.header().stated_bounds_m(file.crs()));
     let mut outside = 0;
     while let Some(batch) = file.next_batch()? {
         progress(batch.len() as u64)?;
@@ -100,12 +100,6 @@ fn judge(
     note_scale(file, &mut notes);
     observed.report(&mut notes);
     Ok(notes)
-}
-
-/// The header's bounds in metres.
-fn stated_bounds(file: &LasFile) -> Option<Bounds3> {
-    let [min, max] = file.header().stated_bounds()?.map(|corner| file.crs().world_from_crs(corner));
-    Some(Bounds3 { min, max })
 }
 
 fn check_damage(file: &LasFile, damaged: Damaged, notes: &mut Notes) -> Result<(), Error> {
@@ -278,9 +272,4 @@ pub(crate) fn is_zero(column: &Column) -> bool {
         Column::U8(values) => values.iter().all(|value| *value == 0),
         other => (0..other.len()).all(|index| other.value(index) == 0.0),
     }
-}
-
-/// Makes a column of `f64` of any column.
-pub(crate) fn widen(column: &Column) -> Column {
-    Column::F64((0..column.len()).map(|index| column.value(index)).collect())
 }

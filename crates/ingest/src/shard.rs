@@ -70,6 +70,16 @@ impl ShardIndex {
         tiles.dedup();
         tiles
     }
+
+    /// Whether there are points of a tile.
+    pub(crate) fn holds(&self, tile: TileId) -> bool {
+        self.sections.iter().any(|section| section.tile == tile)
+    }
+
+    /// The sections of the tiles that are wanted.
+    pub(crate) fn sections_of(&self, wanted: impl Fn(TileId) -> bool) -> Vec<Section> {
+        self.sections.iter().filter(|section| wanted(section.tile)).copied().collect()
+    }
 }
 
 /// Writes the payload.

@@ -18,9 +18,11 @@ pub trait Source: Read + Seek + Send + Sync {
     /// # Errors
     /// [`Error::Io`].
     fn read_at(&mut self, at: u64, bytes: &mut [u8], what: &str) -> Result<(), Error> {
-        let place = || format!("{what} ({} bytes at byte {at})", bytes.len());
-        let name = place();
-        self.seek(SeekFrom::Start(at)).and_then(|_| self.read_exact(bytes)).map_err(Error::io(name))
+        let read = self.seek(SeekFrom::Start(at)).and_then(|_| self.read_exact(bytes));
+        read.map_err(|source| {
+            let place = format!("{what} ({} bytes at byte {at})", bytes.len());
+            Error::Io { place, source }
+        })
     }
 }
 

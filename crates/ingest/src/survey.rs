@@ -1,13 +1,13 @@
 //! What a campaign's files are, from their headers and a handful of points.
 
-use crate::crs::{UnitChoice, crs_of};
+use crate::crs::UnitChoice;
+use crate::file::{open_file, read_head};
 use crate::header::Header;
 use crate::laszip::{Laszip, Plan};
 use crate::source::Source;
 use crate::vlr::Records;
 use crate::{Error, Notes};
 use serde::Serialize;
-use std::fs::File;
 use std::path::Path;
 use timberline_artefact::Crs;
 use timberline_pointcloud::Bounds3;
@@ -50,7 +50,7 @@ pub struct FileFacts {
 /// [`Error::File`] for a file that cannot be taken in.
 pub fn survey(path: &Path, units: UnitChoice, crs: Option<&Crs>) -> Result<FileFacts, Error> {
     let open = || {
-        let mut file = File::open(path).map_err(Error::io("the file"))?;
+        let mut file = open_file(path)?;
         survey_source(&mut file, units, crs)
     };
     open().map_err(|error| error.in_file(path))
@@ -66,16 +66,8 @@ pub fn survey_source(
     crs: Option<&Crs>,
 ) -> Result<FileFacts, Error> {
     let mut notes = Notes::default();
-    let header = Header::read(source, &mut notes)?;
-    let records = Records::read(source, &header, &mut notes)?;
-    let crs = match crs {
-        Some(given) => given.clone(),
-        None => crs_of(&header, &records, units, &mut notes)?,
-    };
-    let bounds = header.stated_bounds().map(|corners| {
-        let [min, max] = corners.map(|corner| crs.world_from_crs(corner));
-        Bounds3 { min, max }
-    });
+    let (header, records, crs) = read_head(source, units, crs, &mut notes)?;
+    let bounds = header.stated_bounds_m(&crs);
     let samples = sample(source, &header, &records, &mut notes)?;
     let density_per_m2 = bounds.and_then(|bounds| {
         let covered = covered_share(&header, &samples);

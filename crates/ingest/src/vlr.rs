@@ -20,11 +20,10 @@ const PROJECTION: &str = "LASF_Projection";
 const SPEC: &str = "LASF_Spec";
 const LASZIP: &str = "laszip encoded";
 const GEO_KEYS: u16 = 34735;
-const GEO_DOUBLES: u16 = 34736;
-const GEO_ASCII: u16 = 34737;
+pub(crate) const GEO_DOUBLES: u16 = 34736;
+pub(crate) const GEO_ASCII: u16 = 34737;
 const WKT: u16 = 2112;
 const EXTRA_BYTES: u16 = 4;
-const WAVEFORMS: std::ops::RangeInclusive<u16> = 100..=354;
 const LASZIP_ID: u16 = 22204;
 
 /// A record's data and where they stand.
@@ -51,8 +50,6 @@ pub struct Records {
     pub laszip: Option<RecordData>,
     /// Extra byte descriptions (4); some writers use one record for each.
     pub extra_bytes: Vec<RecordData>,
-    /// Whether waveform descriptors are there (100 to 354).
-    pub waveforms: bool,
     /// Whether the file says it is a COPC file.
     pub copc: bool,
 }
@@ -106,7 +103,6 @@ impl Records {
         }
         match (head.user.as_str(), head.id) {
             (SPEC, EXTRA_BYTES) => self.extra_bytes.extend(load(source, head)?),
-            (SPEC, id) if WAVEFORMS.contains(&id) => self.waveforms = true,
             ("copc", 1) => self.copc = true,
             _ => {}
         }

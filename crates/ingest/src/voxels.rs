@@ -6,6 +6,7 @@
 //! and the tips of its highest trees: here only what hangs above everything, with a gap, is isolated.
 //! Points below the ground are the ground filter's affair.
 
+use crate::rules;
 use timberline_pointcloud::PointCloud;
 
 /// Edge of a voxel: lasnoise's default step (LAStools; lidR's `ivf` has 5 m).
@@ -17,13 +18,6 @@ pub(crate) type Voxel = [i32; 3];
 /// How many points must lie below, for each point that makes a voxel isolated: in sparse or empty
 /// surroundings nothing is.
 const MASS_FACTOR: u64 = 10;
-
-const WITHHELD: u8 = 1 << 2;
-
-/// Whether a point counts as company for others: neither withheld nor called noise by the supplier.
-pub(crate) fn is_company(classification: u8, flags: u8) -> bool {
-    flags & WITHHELD == 0 && !matches!(classification, 7 | 18)
-}
 
 /// The voxel of a world position.
 pub(crate) fn voxel_of(world_m: [f64; 3]) -> Voxel {
@@ -40,7 +34,7 @@ pub(crate) fn floor(value: f64) -> i32 {
 pub(crate) fn count(cloud: &PointCloud) -> Vec<(Voxel, u32)> {
     let mut runs: Vec<(Voxel, u32)> = Vec::new();
     for index in 0..cloud.len() {
-        if !is_company(cloud.classification[index], cloud.flags[index]) {
+        if !rules::is_company(cloud.classification[index], cloud.flags[index]) {
             continue;
         }
         let voxel = voxel_of(cloud.world(index));
