@@ -1,9 +1,13 @@
 //! Runs one stage outside the orchestrator: for tests, examples and for looking into one failed unit.
 
+use crate::kinds::PointTile;
 use crate::stage::{Campaign, Context, InputFile, Inputs, Stage, StageError, Task};
 use crate::{Facts, Kind, UnitId};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
+use timberline_pointcloud::order::canonical_order;
+use timberline_pointcloud::{PointCloud, TileGrid, TileId};
 
 /// A folder of artefacts made one by one, without keys.
 #[derive(Debug, Clone)]
@@ -41,6 +45,43 @@ impl Alone {
         self.record("by-hand", &unit, serde_json::Value::Null, &[K::NAME], |context| {
             context.emit(value, facts).map_err(StageError::from)
         })
+    }
+
+    /// Cuts points into tiles and puts them there, each tile in canonical order. Returns the tiles
+    /// with their points and facts, sorted.
+    ///
+    /// # Errors
+    /// Those of writing them.
+    pub fn put_tiles(
+        &mut self,
+        cloud: &PointCloud,
+        grid: TileGrid,
+    ) -> Result<Vec<(TileId, PointCloud, Facts)>, StageError> {
+        let mut own: BTreeMap<TileId, Vec<u32>> = BTreeMap::new();
+        for index in canonical_order(cloud) {
+            let [x, y, _] = cloud.world(index as usize);
+            own.entry(grid.tile_at(x, y)).or_default().push(index);
+        }
+        let mut tiles = Vec::new();
+        for (tile, indices) in own {
+            let part = cloud.select(&indices);
+            let lowest = part.z.iter().fold(f64::INFINITY, |low, z| low.min(*z));
+            let lowest = lowest + cloud.frame.origin_m[2] as f64;
+            let part = part.in_frame(PointTile::frame(&grid, tile, lowest));
+            let facts = Facts { frame: Some(part.frame), grid: Some(grid), ..Facts::default() }
+                .count("points", part.len());
+            self.put(UnitId::Tile(tile), &PointTile { cloud: part.clone() }, facts.clone())?;
+            tiles.push((tile, part, facts));
+        }
+        Ok(tiles)
+    }
+
+    /// Reads an artefact of a unit that was put there or emitted.
+    ///
+    /// # Errors
+    /// As [`Inputs::own`].
+    pub fn read<K: Kind>(&self, unit: UnitId) -> Result<K, StageError> {
+        Ok(Inputs::new(unit, None, self.files.clone()).own()?.1)
     }
 
     /// Runs a stage on a unit with the artefacts so far (those its declaration names, of all units)

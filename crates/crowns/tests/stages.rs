@@ -9,7 +9,7 @@ use rand_chacha::rand_core::SeedableRng;
 use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::*;
 use timberline_artefact::stage::Campaign;
-use timberline_artefact::{Facts, Kind, UnitId, read, read_header, tree_id};
+use timberline_artefact::{Kind, UnitId, read, read_header, tree_id};
 use timberline_crowns::stage::{CrownFitStage, CrownModelStage};
 use timberline_crowns::{CrownFitParams, CrownModelParams};
 use timberline_pointcloud::{Point, PointCloud, TileGrid};
@@ -83,17 +83,12 @@ fn run(grid: TileGrid, threads: usize) -> (Vec<CrownModel>, Vec<Tree>, Vec<Strin
     let mut store = Alone::new(folder.path(), campaign);
     let stand = stand();
     let tops = tops(&stand);
-    let mut tiles: Vec<_> = stand.points.iter().map(|p| grid.tile_at(p[0], p[1])).collect();
-    tiles.sort();
-    tiles.dedup();
-    for &tile in &tiles {
-        let frame = PointTile::frame(&grid, tile, 100.0);
-        let mut cloud = PointCloud::new(frame);
-        let first = Point { return_number: 1, number_of_returns: 1, ..Point::default() };
-        let here = |p: &&[f64; 3]| grid.tile_at(p[0], p[1]) == tile;
-        stand.points.iter().filter(here).for_each(|p| cloud.push_world(*p, &first));
-        let cloud = cloud.in_canonical_order();
-        let facts = Facts { frame: Some(frame), grid: Some(grid), ..Facts::default() };
+    let mut whole = PointCloud::default();
+    let first = Point { return_number: 1, number_of_returns: 1, ..Point::default() };
+    stand.points.iter().for_each(|p| whole.push_world(*p, &first));
+    let tiles = store.put_tiles(&whole, grid).unwrap();
+    for (tile, cloud, facts) in &tiles {
+        let here = |p: &&[f64; 3]| grid.tile_at(p[0], p[1]) == *tile;
         let world: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.world(i)).collect();
         let height_m = world.iter().map(|p| (p[2] - 100.0) as f32).collect();
         let (id, score) = world.iter().map(|p| label_of(*p, &tops)).unzip();
@@ -108,15 +103,14 @@ fn run(grid: TileGrid, threads: usize) -> (Vec<CrownModel>, Vec<Tree>, Vec<Strin
             })
             .collect();
         here.sort_by_key(|top| top.id);
-        let counted = facts.clone().count("points", cloud.len());
-        store.put(UnitId::Tile(tile), &PointTile { cloud }, counted).unwrap();
-        store.put(UnitId::Tile(tile), &Heights { height_m }, facts.clone()).unwrap();
-        store.put(UnitId::Tile(tile), &Labels { tree_id: id, score }, facts.clone()).unwrap();
-        store.put(UnitId::Tile(tile), &Treetops { tops: here }, facts).unwrap();
+        let unit = UnitId::Tile(*tile);
+        store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
+        store.put(unit.clone(), &Labels { tree_id: id, score }, facts.clone()).unwrap();
+        store.put(unit, &Treetops { tops: here }, facts.clone()).unwrap();
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let (mut models, mut trees, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
-    for &tile in &tiles {
+    for (tile, ..) in tiles {
         let unit = UnitId::Tile(tile);
         let params = CrownModelParams::default();
         let path =

@@ -9,7 +9,7 @@ use std::collections::BTreeMap;
 use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::{GroundModel, GroundPoints, Heights, PointTile};
 use timberline_artefact::stage::Campaign;
-use timberline_artefact::{Facts, Kind, UnitId, read};
+use timberline_artefact::{Kind, UnitId};
 use timberline_ground::stage::{DtmStage, GroundStage, surface_of};
 use timberline_ground::{DtmParams, GroundParams};
 use timberline_pointcloud::frame::ticks_from_world;
@@ -24,11 +24,18 @@ struct Outcome {
     cells: BTreeMap<[i64; 2], u64>,
 }
 
+fn tiles_of(store: &mut Alone, cloud: &PointCloud, grid: TileGrid) -> Vec<TileId> {
+    store.put_tiles(cloud, grid).unwrap().into_iter().map(|(tile, ..)| tile).collect()
+}
+
+fn file<K: Kind>(store: &Alone, tile: TileId) -> K {
+    store.read(UnitId::Tile(tile)).unwrap()
+}
+
 fn over_tiles(cloud: &PointCloud, grid: TileGrid) -> Outcome {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign::default());
-    let tiles = store.put_tiles(cloud, grid).unwrap();
-    let tiles: Vec<TileId> = tiles.into_iter().map(|(tile, ..)| tile).collect();
+    let tiles = tiles_of(&mut store, cloud, grid);
     for tile in &tiles {
         store.run::<GroundStage>(UnitId::Tile(*tile), None, &GroundParams::default()).unwrap();
     }

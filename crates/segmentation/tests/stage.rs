@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::*;
 use timberline_artefact::stage::{Campaign, Stage};
-use timberline_artefact::{Facts, Kind, UnitId, read, tree_id};
+use timberline_artefact::{Kind, UnitId, read, tree_id};
 use timberline_pointcloud::frame::{quantise, ticks_from_world};
 use timberline_pointcloud::{Point, PointCloud, TileGrid};
 use timberline_segmentation::SegmentationParams;
@@ -58,29 +58,20 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign { grid: Some(grid), ..Campaign::default() });
     let (points, models) = (points(), models());
-    let mut tiles: Vec<_> = points.iter().map(|p| grid.tile_at(p[0], p[1])).collect();
-    tiles.sort();
-    tiles.dedup();
-    let mut clouds = Vec::new();
-    for &tile in &tiles {
-        let frame = PointTile::frame(&grid, tile, CORNER[2]);
-        let mut cloud = PointCloud::new(frame);
-        let here = |p: &&[f64; 3]| grid.tile_at(p[0], p[1]) == tile;
-        points.iter().filter(here).for_each(|p| cloud.push_world(*p, &Point::default()));
-        let cloud = cloud.in_canonical_order();
+    let mut whole = PointCloud::default();
+    points.iter().for_each(|p| whole.push_world(*p, &Point::default()));
+    let tiles = store.put_tiles(&whole, grid).unwrap();
+    for (tile, cloud, facts) in &tiles {
         let height_m = (0..cloud.len()).map(|i| (cloud.world(i)[2] - CORNER[2]) as f32).collect();
-        let here = |m: &&CrownModel| grid.tile_at(m.apex_m[0], m.apex_m[1]) == tile;
+        let here = |m: &&CrownModel| grid.tile_at(m.apex_m[0], m.apex_m[1]) == *tile;
         let mut models: Vec<CrownModel> = models.iter().filter(here).cloned().collect();
         models.sort_by_key(|model| model.id);
-        let facts = Facts { frame: Some(frame), grid: Some(grid), ..Facts::default() };
-        let counted = facts.clone().count("points", cloud.len());
-        clouds.push(cloud.clone());
-        store.put(UnitId::Tile(tile), &PointTile { cloud }, counted).unwrap();
-        store.put(UnitId::Tile(tile), &Heights { height_m }, facts.clone()).unwrap();
-        store.put(UnitId::Tile(tile), &CrownModels { models }, facts).unwrap();
+        let unit = UnitId::Tile(*tile);
+        store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
+        store.put(unit, &CrownModels { models }, facts.clone()).unwrap();
     }
     let mut labelled = BTreeMap::new();
-    for (tile, cloud) in tiles.into_iter().zip(clouds) {
+    for (tile, cloud, _) in tiles {
         let params = SegmentationParams::default();
         let path = store.run::<SegmentationStage>(UnitId::Tile(tile), None, &params).unwrap();
         let (_, Labels { tree_id, score }) = read::<Labels>(&path).unwrap();

@@ -9,7 +9,7 @@
 
 use proptest::prelude::*;
 use timberline_artefact::alone::Alone;
-use timberline_artefact::kinds::{GroundPoints, Heights, PointTile, Treetop, Treetops};
+use timberline_artefact::kinds::{GroundPoints, Heights, Treetop, Treetops};
 use timberline_artefact::stage::Campaign;
 use timberline_artefact::{Facts, UnitId, read, tree_id};
 use timberline_pointcloud::{Frame, Point, PointCloud, TileGrid, TileId, frame};
@@ -38,25 +38,14 @@ fn height_of(cloud: &PointCloud, index: usize) -> f32 {
 fn over_tiles(cloud: &PointCloud, grid: TileGrid, params: &Params) -> Vec<Treetop> {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign::default());
-    let tile_of = |i: u32| {
-        let [x, y, _] = cloud.world(i as usize);
-        grid.tile_at(x, y)
-    };
-    let mut tiles: Vec<TileId> = (0..cloud.len() as u32).map(tile_of).collect();
-    tiles.sort_unstable();
-    tiles.dedup();
-    for &tile in &tiles {
-        let own: Vec<u32> = (0..cloud.len() as u32).filter(|&i| tile_of(i) == tile).collect();
-        let part = cloud.select(&own).in_frame(PointTile::frame(&grid, tile, 100.0));
-        let facts = Facts { frame: Some(part.frame), grid: Some(grid), ..Facts::default() };
-        let facts = facts.count("points", part.len());
-        let height_m = (0..part.len()).map(|i| height_of(&part, i)).collect();
-        let unit = UnitId::Tile(tile);
-        store.put(unit.clone(), &PointTile { cloud: part }, facts.clone()).unwrap();
+    let tiles = store.put_tiles(cloud, grid).unwrap();
+    for (tile, part, facts) in &tiles {
+        let height_m = (0..part.len()).map(|i| height_of(part, i)).collect();
+        let unit = UnitId::Tile(*tile);
         store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
-        store.put(unit, &GroundPoints::default(), facts).unwrap();
+        store.put(unit, &GroundPoints::default(), facts.clone()).unwrap();
     }
-    let run = |tile: &TileId| {
+    let run = |(tile, ..): &(TileId, PointCloud, Facts)| {
         let path = store.run::<TreetopsStage>(UnitId::Tile(*tile), None, params).unwrap();
         read::<Treetops>(&path).unwrap().1.tops
     };
