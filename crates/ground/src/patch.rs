@@ -28,20 +28,25 @@ impl PatchNodes {
     /// square, and thinned there: a lone square beside dense ground must not collect all of it.
     #[must_use]
     pub fn gather(nodes: &Nodes, cell: Cell, least: usize, reach_m: f64) -> Self {
-        let near_m = SUPPORT_MARGIN * cell.edge_m();
-        let mut margin = near_m;
-        loop {
+        let within = |margin_m: f64| {
             let mut found = Vec::new();
-            nodes.around(cell, margin, |index| found.push(index));
-            let wider = margin + 0.5 * cell.edge_m();
-            if found.len() >= least || wider > reach_m {
-                if margin > near_m && found.len() > least {
-                    found = thinned(nodes, cell, near_m, &found);
-                }
-                return Self::of(nodes, cell, &found, margin);
-            }
-            margin = wider;
+            nodes.around(cell, margin_m, |index| found.push(index));
+            found
+        };
+        let step = 0.5 * cell.edge_m();
+        let mut margin = SUPPORT_MARGIN * cell.edge_m();
+        let near = within(margin);
+        let mut wide = Vec::new();
+        while near.len().max(wide.len()) < least && margin + step <= reach_m {
+            margin += step;
+            wide = within(margin);
         }
+        if wide.len() > least {
+            wide = thinned(nodes, cell, near, &wide);
+        } else if wide.is_empty() {
+            wide = near;
+        }
+        Self::of(nodes, cell, &wide, margin)
     }
 
     fn of(nodes: &Nodes, cell: Cell, found: &[usize], margin_m: f64) -> Self {
@@ -99,11 +104,10 @@ const FAR_SQUARES: i64 = 8;
 /// So many far nodes are enough: a few rows of those squares.
 const MOST_FAR_NODES: usize = 64;
 
-/// All nodes within the usual neighbourhood (the surface must pass through them), and of those
-/// beyond it one per world-fixed square, the nearest to the patch first.
-fn thinned(nodes: &Nodes, cell: Cell, near_m: f64, found: &[usize]) -> Vec<usize> {
-    let mut kept = Vec::new();
-    nodes.around(cell, near_m, |index| kept.push(index));
+/// The few `near` nodes (the surface must pass through them), and of those `found` beyond them one
+/// per world-fixed square, the nearest to the patch first.
+fn thinned(nodes: &Nodes, cell: Cell, near: Vec<usize>, found: &[usize]) -> Vec<usize> {
+    let mut kept = near;
     let square = ((TICKS_PER_M * cell.edge_m()) as i64 / FAR_SQUARES).max(1);
     let centre = cell.centre();
     let mut seen = BTreeSet::new();
