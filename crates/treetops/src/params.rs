@@ -35,7 +35,7 @@ pub enum RankBy {
     /// Height above ground. On slopes the maxima of a crown move downhill.
     Height,
     /// Elevation. On slopes the maxima stay at the apex; with windows not much wider than a crown
-    /// the higher ground uphill does no harm (on simulated stands of 30 degrees F is 0.02 better).
+    /// the higher ground uphill does no harm (`by_density_and_slope` in tests/stands.rs compares).
     Elevation,
 }
 
@@ -217,6 +217,16 @@ mod tests {
     fn the_presets_are_sound() {
         for params in [Params::default(), Params::paper(), Params::fixed_circle(3.0)] {
             assert_eq!(params.check(), Vec::<String>::new());
+        }
+    }
+
+    #[test]
+    fn the_ranges_are_those_of_the_schema() {
+        let schema = schemars::schema_for!(Params).to_value();
+        for (name, _, low, high) in Params::default().ranges() {
+            let property = &schema["properties"][name];
+            assert_eq!(property["minimum"].as_f64(), Some(low), "{name}");
+            assert_eq!(property["maximum"].as_f64(), Some(high), "{name}");
         }
     }
 
