@@ -241,7 +241,7 @@ fn check_prefix(path: &Path, file: &mut File, len: u64) -> Result<u32, Error> {
         return Ok(found);
     }
     let what = "container".to_owned();
-    Err(Error::Version { path: path.to_path_buf(), what, found, supported: CONTAINER_VERSION })
+    Err(Error::Version { path: path.to_path_buf(), what, found, supported: &[CONTAINER_VERSION] })
 }
 
 fn read_trailer(path: &Path, file: &mut File, len: u64) -> Result<(Numbers, u64), Error> {

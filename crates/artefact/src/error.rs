@@ -46,8 +46,9 @@ pub enum Error {
     },
     /// Written by another version of the program.
     #[error(
-        "{path}: `{what}` version {found}, this program reads version {supported}; \
-         run the pipeline again to rebuild it, or use the program version that wrote it"
+        "{path}: `{what}` version {found}, this program reads version {}; \
+         run the pipeline again to rebuild it, or use the program version that wrote it",
+        listed(supported)
     )]
     Version {
         /// The file.
@@ -56,8 +57,8 @@ pub enum Error {
         what: String,
         /// Version in the file.
         found: u32,
-        /// Version this program knows.
-        supported: u32,
+        /// Versions this program reads, ascending.
+        supported: &'static [u32],
     },
     /// A value cannot be written as this kind.
     #[error("cannot encode `{kind}`: {detail}")]
@@ -100,6 +101,11 @@ pub enum Error {
     /// Columns that do not fit together.
     #[error(transparent)]
     Points(#[from] timberline_pointcloud::Error),
+}
+
+/// Versions in a row: `1`, `1 or 2`.
+fn listed(versions: &[u32]) -> String {
+    versions.iter().map(u32::to_string).collect::<Vec<_>>().join(" or ")
 }
 
 impl Error {

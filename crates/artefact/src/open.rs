@@ -83,7 +83,7 @@ pub fn read<K: Kind>(path: &Path) -> Result<(Header, K), Error> {
     Ok((opened.into_header(), value))
 }
 
-/// Checks that a header announces a kind in the version this program reads.
+/// Checks that a header announces a kind in a version this program reads.
 ///
 /// # Errors
 /// [`Error::WrongKind`] or [`Error::Version`].
@@ -95,12 +95,12 @@ pub fn check_kind<K: Kind>(path: &Path, header: &Header) -> Result<(), Error> {
             found: header.kind.clone(),
         });
     }
-    if header.kind_version != K::VERSION {
+    if !K::READABLE.contains(&header.kind_version) {
         return Err(Error::Version {
             path: path.to_path_buf(),
             what: K::NAME.to_owned(),
             found: header.kind_version,
-            supported: K::VERSION,
+            supported: K::READABLE,
         });
     }
     Ok(())

@@ -7,11 +7,15 @@ mod common;
 use proptest::prelude::*;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use timberline_artefact::alone::Alone;
+use timberline_artefact::container::ContainerWriter;
 use timberline_artefact::kinds::*;
 use timberline_artefact::stage::{Campaign, Context, Inputs, Params, Stage, StageError, StageInfo};
-use timberline_artefact::{Aligned, Error, Kind, Opened, UnitId, UnitKind, gather, read};
+use timberline_artefact::{
+    Aligned, Error, Kind, Opened, UnitId, UnitKind, gather, read, read_header,
+};
 use timberline_pointcloud::{Frame, PointCloud, Rect, TileId, frame::quantise};
 
 fn golden() -> PathBuf {
@@ -254,6 +258,69 @@ fn golden_files_stay_readable() {
     }
 }
 
+/// Reads the golden file of every older version of a kind: whole where it is migrated, else refused
+/// by a message that names both versions.
+fn read_older<K: Kind>() {
+    for version in 1..K::VERSION {
+        let path = golden().join(format!("{}-v{version}.{}", K::NAME, K::EXTENSION));
+        assert!(path.exists(), "{} is missing", path.display());
+        let known = K::READABLE.contains(&version);
+        match read::<K>(&path) {
+            Ok((header, _)) => assert!(known && header.kind_version == version),
+            Err(error) => {
+                let text = error.to_string();
+                assert!(!known && text.contains(&format!("version {version}")), "{text}");
+            }
+        }
+    }
+}
+
+#[test]
+fn golden_files_of_older_versions_are_migrated_or_refused_by_name() {
+    read_older::<PointTile>();
+    read_older::<GroundPoints>();
+    read_older::<GroundModel>();
+    read_older::<Heights>();
+    read_older::<Treetops>();
+    read_older::<CrownModels>();
+    read_older::<Labels>();
+    read_older::<Trees>();
+    read_older::<Outputs>();
+    assert_eq!(Trees::READABLE, [1, 2]);
+}
+
+/// What version 1 kept is there; what it did not keep is missing and not zero.
+#[test]
+fn trees_of_version_1_are_migrated() {
+    let (_, table) = read::<Trees>(&golden().join("trees-v1.tmbr")).unwrap();
+    let expected = Tree {
+        position_extent_m: f64::NAN,
+        surface_apex_m: f64::NAN,
+        semi_axes_m: [1.5, 1.5],
+        rotation_deg: f64::NAN,
+        fit_cells: 0,
+        fit_objective_m: f64::NAN,
+        fit_gap: f64::NAN,
+        fit_nodes: 0,
+        ..common::tree()
+    };
+    // As text, where not-a-number is equal to itself.
+    assert_eq!(format!("{:?}", table.trees), format!("{:?}", [expected]));
+}
+
+#[test]
+fn a_version_that_cannot_be_read_names_those_that_can() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("x.tmbr");
+    let mut header = read_header(&golden_file("trees")).unwrap();
+    header.kind_version = 9;
+    let mut writer = ContainerWriter::new(std::fs::File::create(&path).unwrap()).unwrap();
+    writer.write_all(b"of the future").unwrap();
+    writer.finish(&header.to_json().unwrap()).unwrap();
+    let error = read::<Trees>(&path).unwrap_err().to_string();
+    assert!(error.contains("`trees` version 9, this program reads version 1 or 2"), "{error}");
+}
+
 #[test]
 fn golden_files_hold_what_was_written() {
     let folder = tempfile::tempdir().unwrap();
@@ -264,7 +331,7 @@ fn golden_files_hold_what_was_written() {
 }
 
 #[test]
-fn a_newer_version_names_both_and_the_remedy() {
+fn a_newer_container_names_both_versions_and_the_remedy() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("x.tmbr");
     let mut bytes = std::fs::read(golden().join("trees-v1.tmbr")).unwrap();

@@ -2,7 +2,9 @@
 //!
 //! Raise a kind's `VERSION` whenever the meaning or the bytes of its payload change; add a golden
 //! file of the new version under `golden/` (`cargo test -p timberline-artefact -- --ignored
-//! write_golden_files` makes it) and keep the old one, which must then be refused by name.
+//! write_golden_files` makes it) and keep the old one. What the old payload held becomes a struct
+//! of its own, as in [`trees`], that turns into the present one; named in `table_kind!`, its version
+//! stays readable. A version that is not named there is refused by name.
 
 pub mod crown_models;
 pub mod ground_model;
@@ -30,15 +32,17 @@ pub use labels::Labels;
 pub use outputs::{OutputFile, Outputs};
 pub use points::PointTile;
 pub use shards::Shards;
-pub use trees::{PositionSource, Tree, TreeFlag, Trees};
+pub use trees::{PositionMethod, Tree, TreeFlag, Trees};
 pub use treetops::{Treetop, Treetops};
 
 /// A kind of artefact.
 pub trait Kind: Sized {
     /// Its name in headers, pipelines and messages.
     const NAME: &'static str;
-    /// Version of its payload.
+    /// Version of its payload, as it is written.
     const VERSION: u32;
+    /// Versions that can be read: the present one and those that are migrated to it.
+    const READABLE: &'static [u32] = &[Self::VERSION];
     /// Ending of its files, without the dot.
     const EXTENSION: &'static str;
     /// What it is, in a line.
@@ -50,7 +54,7 @@ pub trait Kind: Sized {
     /// [`Error::Encode`] or the file's error.
     fn encode(&self, header: &Header, out: &mut File) -> Result<(), Error>;
 
-    /// Reads the payload of a file whose header announces this kind and version.
+    /// Reads the payload of a file whose header announces this kind in a readable version.
     ///
     /// # Errors
     /// [`Error::Corrupt`].
@@ -84,12 +88,17 @@ fn decode_table<T: DeserializeOwned>(path: &Path, opened: &mut Opened) -> Result
     }
 }
 
-/// Implements [`Kind`] for a table.
+/// Implements [`Kind`] for a table. Older versions are given with their wire forms, which must turn
+/// `Into` the present one: `table_kind!(Trees, "trees", 2, "...", 1 => v1::Trees)`.
 macro_rules! table_kind {
-    ($type:ty, $name:literal, $version:literal, $summary:literal) => {
+    (
+        $type:ty, $name:literal, $version:literal, $summary:literal
+        $(, $old:literal => $wire:ty)*
+    ) => {
         impl $crate::Kind for $type {
             const NAME: &'static str = $name;
             const VERSION: u32 = $version;
+            const READABLE: &'static [u32] = &[$($old,)* $version];
             const EXTENSION: &'static str = $crate::kinds::TABLE_EXTENSION;
             const SUMMARY: &'static str = $summary;
 
@@ -105,7 +114,10 @@ macro_rules! table_kind {
                 path: &std::path::Path,
                 opened: &mut $crate::Opened,
             ) -> Result<Self, $crate::Error> {
-                $crate::kinds::decode_table(path, opened)
+                match opened.header().kind_version {
+                    $($old => $crate::kinds::decode_table::<$wire>(path, opened).map(Into::into),)*
+                    _ => $crate::kinds::decode_table(path, opened),
+                }
             }
         }
     };

@@ -1,4 +1,10 @@
 //! The tree table of a tile. Raise the version when the fields or their meaning change.
+//!
+//! * Version 2: the fitted surface with its centre, apex, rotation, objective and certificate; the
+//!   extent of the position beside its standard error; the method that made the position.
+//! * Version 1 (`v1.rs`) is read and migrated.
+
+mod v1;
 
 use super::table_kind;
 use crate::kinds::{CrownShape, CrownStatus};
@@ -11,14 +17,34 @@ pub struct Trees {
     pub trees: Vec<Tree>,
 }
 
-/// Where a tree's position comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-pub enum PositionSource {
-    /// Centre of the fitted crown surface.
-    CrownFit,
-    /// The highest point: there was no usable fit.
+/// The method that made a tree's position.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
+pub enum PositionMethod {
+    /// The highest point: asked for, or there was no usable fit.
     #[default]
     HighestPoint,
+    /// Centre of the elliptic paraboloid with the smallest sum of absolute residuals.
+    L1,
+    /// Centre of the elliptic paraboloid with the smallest sum of squared residuals.
+    L2,
+    /// Centroid of the convex hull of the crown's points.
+    HullCentroid,
+    /// Peak of a consensus crown model.
+    StarSac,
+}
+
+impl PositionMethod {
+    /// The method's name in tables and parameters.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::HighestPoint => "highest-point",
+            Self::L1 => "l1",
+            Self::L2 => "l2",
+            Self::HullCentroid => "hull-centroid",
+            Self::StarSac => "starsac",
+        }
+    }
 }
 
 /// Something to know about a tree; a bit set in [`Tree::flags`].
@@ -29,7 +55,7 @@ pub enum TreeFlag {
     Underdetermined = 0,
     /// As many cells as unknowns.
     NoRedundancy = 1,
-    /// The limit of the largest axis is active.
+    /// A limit of the axes is active: flat, hollow or needle-like crown.
     ShapeBoundActive = 2,
     /// The centre lies outside the data.
     CentreOutsideData = 3,
@@ -43,11 +69,13 @@ pub enum TreeFlag {
     ModelRejected = 7,
     /// The crown is cut by the edge of the scanned area.
     AtSurveyEdge = 8,
+    /// The best surface is no elliptic paraboloid that opens downward, and has no apex.
+    NotElliptic = 9,
 }
 
 impl TreeFlag {
     /// All flags.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Underdetermined,
         Self::NoRedundancy,
         Self::ShapeBoundActive,
@@ -57,6 +85,7 @@ impl TreeFlag {
         Self::ImbalanceActive,
         Self::ModelRejected,
         Self::AtSurveyEdge,
+        Self::NotElliptic,
     ];
 
     /// The flag's bit.
@@ -78,6 +107,7 @@ impl TreeFlag {
             Self::ImbalanceActive => "imbalance-active",
             Self::ModelRejected => "model-rejected",
             Self::AtSurveyEdge => "at-survey-edge",
+            Self::NotElliptic => "not-elliptic",
         }
     }
 
@@ -102,14 +132,36 @@ pub struct Tree {
     pub height_m: f64,
     /// World position taken for the stem, metres.
     pub position_m: [f64; 2],
-    /// Where the position comes from.
-    pub position_source: PositionSource,
-    /// Standard error of the position, metres (both axes together); NaN without a fit.
-    pub position_uncertainty_m: f64,
-    /// Semi-axes of the fitted surface one metre below its apex, metres; NaN without a fit.
+    /// The method that made the position.
+    pub position_method: PositionMethod,
+    /// Radius around the position of the centres whose best surface has an objective within 0.1 %
+    /// of the smallest, metres; NaN where it was not computed.
+    pub position_extent_m: f64,
+    /// Asymptotic standard error of the position, metres (both axes together); NaN without one.
+    pub position_standard_error_m: f64,
+    /// World position of the fitted surface's centre, metres; NaN without a surface. It is the
+    /// position, unless the flags say why not.
+    pub surface_centre_m: [f64; 2],
+    /// Elevation of the fitted surface at its centre, metres; NaN without a surface.
+    pub surface_apex_m: f64,
+    /// Semi-axes of the fitted surface one metre below its apex, the larger first, metres; NaN
+    /// without a surface.
     pub semi_axes_m: [f64; 2],
-    /// Mean absolute residual of the fit, metres; NaN without a fit.
+    /// Rotation of the fitted surface: azimuth of its larger semi-axis, degrees clockwise from grid
+    /// north, at least 0 and below 180; NaN for equal axes and without a surface.
+    pub rotation_deg: f64,
+    /// Cells of the thinned crown that the fit saw; 0 without a fit.
+    pub fit_cells: u32,
+    /// Sum of the cells' absolute vertical residuals, metres; NaN without a surface.
+    pub fit_objective_m: f64,
+    /// Mean of the cells' absolute vertical residuals, metres; NaN without a surface.
     pub fit_residual_m: f64,
+    /// Certified relative gap: no surface has an objective smaller by more than this share; NaN for
+    /// methods without a certificate.
+    pub fit_gap: f64,
+    /// Problems solved until the optimum over the position prior was certified; 0 without a
+    /// certificate.
+    pub fit_nodes: u32,
     /// Form of the crown model.
     pub shape: CrownShape,
     /// Parameters of the crown model.
@@ -138,4 +190,23 @@ pub struct Tree {
     pub flags: u32,
 }
 
-table_kind!(Trees, "trees", 1, "the tree table of a tile");
+impl Tree {
+    /// A tree of which everything about a fitted surface is missing, and all else at its default.
+    #[must_use]
+    pub fn without_fit() -> Self {
+        Self {
+            position_extent_m: f64::NAN,
+            position_standard_error_m: f64::NAN,
+            surface_centre_m: [f64::NAN; 2],
+            surface_apex_m: f64::NAN,
+            semi_axes_m: [f64::NAN; 2],
+            rotation_deg: f64::NAN,
+            fit_objective_m: f64::NAN,
+            fit_residual_m: f64::NAN,
+            fit_gap: f64::NAN,
+            ..Self::default()
+        }
+    }
+}
+
+table_kind!(Trees, "trees", 2, "the tree table of a tile", 1 => v1::Trees);
