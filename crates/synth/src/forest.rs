@@ -77,11 +77,25 @@ impl Forest {
             let pressure = neighbours.pressure(index);
             build_tree(&neighbours.placed[index], index, pressure, terrain, seed)
         };
-        let mut trees: Vec<Tree> =
-            (0..neighbours.placed.len()).into_par_iter().map(build).collect();
+        let trees: Vec<Tree> = (0..neighbours.placed.len()).into_par_iter().map(build).collect();
+        let unplaced = wanted - trees.len();
+        Ok(Self { unplaced, ..Self::over(trees) })
+    }
+
+    /// A forest of given trees, in one frame: they are sorted by descending height (equal ones stay
+    /// in their order) and numbered anew, and what follows from their neighbours is assessed anew.
+    #[must_use]
+    pub fn of(mut trees: Vec<Tree>) -> Self {
+        trees.sort_by(|a, b| b.height_m.total_cmp(&a.height_m));
+        trees.iter_mut().enumerate().for_each(|(index, tree)| tree.id = index as u32 + 1);
+        Self::over(trees)
+    }
+
+    /// Trees in their order, assessed.
+    fn over(mut trees: Vec<Tree>) -> Self {
         let canopy = Canopy::new(&trees, BEAM_MARGIN_M);
         exposure::assess(&mut trees, &canopy);
-        Ok(Self { unplaced: wanted - trees.len(), trees, canopy })
+        Self { unplaced: 0, trees, canopy }
     }
 }
 

@@ -92,6 +92,8 @@ pub(crate) struct Return {
     /// Share of the light of the pulse, relative to a perfect target at the nominal range.
     pub(crate) light: f64,
     pub(crate) target: Target,
+    /// Number of the tree that most of the light comes from; 0 for none.
+    pub(crate) tree: u32,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -99,6 +101,8 @@ struct Hit {
     range: f64,
     light: f64,
     ground: bool,
+    /// Number of the tree, 0 for none.
+    tree: u32,
 }
 
 /// What beams meet.
@@ -244,7 +248,7 @@ impl World<'_> {
         } else {
             return false;
         };
-        returns.push(Return { position: [x, y, z + height], light: 0.05, target });
+        returns.push(Return { position: [x, y, z + height], light: 0.05, target, tree: 0 });
         true
     }
 
@@ -293,6 +297,7 @@ impl World<'_> {
         // Cosine between the beam and the ground's normal.
         let incidence = -closing / (1.0 + gx * gx + gy * gy).sqrt();
         let (mut reflectance, mut is_ground) = (GROUND_REFLECTANCE * incidence, true);
+        let mut tree = 0;
         if cover > 0.0 && stream.chance(cover) {
             let height = self.undergrowth.height_m * stream.unit() * stream.unit();
             range -= height / ray.descent();
@@ -305,13 +310,15 @@ impl World<'_> {
             let optics = &self.optics[passage.tree as usize];
             if let Some(hit) = optics.hit(passage, offset, range, stream) {
                 (range, reflectance, is_ground) = (hit, optics.reflectance(), false);
+                tree = passage.tree + 1;
             }
             if let Some(hit) = optics.stem_hit(ray, offset, range) {
                 (range, reflectance, is_ground) = (hit, WOOD_REFLECTANCE, false);
+                tree = passage.tree + 1;
             }
         }
         let texture = (1.0 + TEXTURE * stream.bell()).max(0.1);
-        Hit { range, light: reflectance * texture / RAYS as f64, ground: is_ground }
+        Hit { range, light: reflectance * texture / RAYS as f64, ground: is_ground, tree }
     }
 }
 
@@ -360,14 +367,38 @@ fn group(ray: &Ray, hits: &[Hit; RAYS], params: &ScannerParams, returns: &mut Ve
         let spread = ray.range_at(ray.origin[2] - params.altitude_m) / range;
         let on_ground = members.iter().all(|hit| hit.ground);
         let target = if on_ground { Target::Ground } else { Target::Vegetation };
-        returns.push(Return { position: ray.at(range), light: light * spread * spread, target });
+        let (position, light) = (ray.at(range), light * spread * spread);
+        returns.push(Return { position, light, target, tree: brightest(members) });
         first = within(params.resolution_m.max(PULSE_LENGTH_M));
     }
+}
+
+/// The tree from which most of the light of some hits comes, 0 for none; of equals the nearest.
+fn brightest(members: &[Hit]) -> u32 {
+    let light = |tree: u32| -> f64 {
+        members.iter().filter(|hit| hit.tree == tree).map(|hit| hit.light).sum()
+    };
+    let mut best = (0, 0.0);
+    for hit in members {
+        let found = light(hit.tree);
+        if found > best.1 {
+            best = (hit.tree, found);
+        }
+    }
+    best.0
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_return_belongs_to_the_tree_of_most_of_its_light() {
+        let hit = |tree, light| Hit { range: 1.0, light, ground: false, tree };
+        assert_eq!(brightest(&[hit(7, 0.2), hit(3, 0.15), hit(3, 0.1)]), 3);
+        assert_eq!(brightest(&[hit(7, 0.2), hit(3, 0.2)]), 7);
+        assert_eq!(brightest(&[hit(0, 0.2), hit(3, 0.1)]), 0);
+    }
 
     #[test]
     fn undergrowth_covers_what_it_should() {

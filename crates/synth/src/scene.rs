@@ -70,16 +70,27 @@ impl Scene {
     /// # Errors
     /// [`Error`] for an empty area and for any parameter out of range.
     pub fn new(params: SceneParams) -> Result<Self, Error> {
-        let Rect { min, max } = params.area;
-        if !(min[0] < max[0] && min[1] < max[1]) {
-            return Err(Error::EmptyArea { min, max });
-        }
-        params.scanner.check()?;
-        check("undergrowth cover", params.undergrowth.cover, 0.0..=0.7, "0 to 0.7")?;
-        check("undergrowth patch_m", params.undergrowth.patch_m, 0.1..=1e4, "0.1 to 10000 m")?;
-        let frame = Frame::new([params.origin_m[0], params.origin_m[1], 0]);
-        let terrain = Terrain::new(&params.terrain, frame, params.seed)?;
+        let (frame, terrain) = ground(&params)?;
         let forest = Forest::grow(&params.stands, &terrain, frame, params.seed)?;
+        Self::assemble(params, frame, terrain, forest)
+    }
+
+    /// The scene of given trees instead of grown ones, in the frame at `params.origin_m`; the stands
+    /// only give the trees their names. [`Forest::of`] makes a forest of trees.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn with_forest(params: SceneParams, forest: Forest) -> Result<Self, Error> {
+        let (frame, terrain) = ground(&params)?;
+        Self::assemble(params, frame, terrain, forest)
+    }
+
+    fn assemble(
+        params: SceneParams,
+        frame: Frame,
+        terrain: Terrain,
+        forest: Forest,
+    ) -> Result<Self, Error> {
         let area = local_rect(frame, &params.area);
         let wide = area.grown(GUESS_MARGIN_M);
         let guess = GroundGuess::new(&terrain, wide.min, wide.max);
@@ -124,6 +135,21 @@ impl Scene {
     /// The points of two rectangles side by side are those of their union, whatever the thread count.
     #[must_use]
     pub fn points_in(&self, rect: &Rect) -> PointCloud {
+        self.measure(rect, |_| ())
+    }
+
+    /// The points of [`Self::points_in`], each with the number of the tree it comes from (as in
+    /// [`crate::Tree::id`]); 0 for the ground, the undergrowth and outliers. A return of several
+    /// targets belongs to the one that most of its light comes from.
+    #[must_use]
+    pub fn labelled_points_in(&self, rect: &Rect) -> (PointCloud, Vec<u32>) {
+        let mut trees = Vec::new();
+        let cloud = self.measure(rect, |tree| trees.push(tree));
+        (cloud, trees)
+    }
+
+    /// Scans a rectangle; `visit` gets the tree of every point in turn.
+    fn measure(&self, rect: &Rect, mut visit: impl FnMut(u32)) -> PointCloud {
         let area = &self.params.area;
         let rect = Rect {
             min: [rect.min[0].max(area.min[0]), rect.min[1].max(area.min[1])],
@@ -136,10 +162,11 @@ impl Scene {
         let view = self.view(&rect);
         for line in &self.flight.lines {
             let sweeps = self.flight.sweeps_over(line, &view.local, view.z[0]);
-            let measured: Vec<Vec<([f64; 3], Point)>> =
+            let measured: Vec<Vec<Measured>> =
                 sweeps.into_par_iter().map(|sweep| self.scan_sweep(line, sweep, &view)).collect();
-            for (world, point) in measured.iter().flatten() {
-                cloud.push_world(*world, point);
+            for one in measured.iter().flatten() {
+                cloud.push_world(one.world, &one.point);
+                visit(one.tree);
             }
         }
         cloud
@@ -177,7 +204,7 @@ impl Scene {
         }
     }
 
-    fn scan_sweep(&self, line: &Line, index: u32, view: &View) -> Vec<([f64; 3], Point)> {
+    fn scan_sweep(&self, line: &Line, index: u32, view: &View) -> Vec<Measured> {
         let (flight, world) = (&self.flight, self.world());
         let sweep = flight.sweep(line, index);
         let pulses = flight.pulses_over(line, &sweep, &view.local, view.z);
@@ -218,7 +245,7 @@ impl Scene {
         returns: &[Return],
         stream: &mut Stream,
         rect: &Rect,
-        points: &mut Vec<([f64; 3], Point)>,
+        points: &mut Vec<Measured>,
     ) {
         let params = &self.flight.params;
         let aside = [0, 1].map(|i| params.horizontal_noise_m * stream.bell() + line.error_m[i]);
@@ -246,7 +273,7 @@ impl Scene {
                 gps_time: self.flight.time_s(line, sweep, pulse),
                 source_id: line.source_id,
             };
-            points.push((world, point));
+            points.push(Measured { world, point, tree: echo.tree });
         }
     }
 
@@ -290,6 +317,27 @@ impl Scene {
             }
         }
     }
+}
+
+/// Frame and terrain of a scene whose parameters are sound.
+fn ground(params: &SceneParams) -> Result<(Frame, Terrain), Error> {
+    let Rect { min, max } = params.area;
+    if !(min[0] < max[0] && min[1] < max[1]) {
+        return Err(Error::EmptyArea { min, max });
+    }
+    params.scanner.check()?;
+    check("undergrowth cover", params.undergrowth.cover, 0.0..=0.7, "0 to 0.7")?;
+    check("undergrowth patch_m", params.undergrowth.patch_m, 0.1..=1e4, "0.1 to 10000 m")?;
+    let frame = Frame::new([params.origin_m[0], params.origin_m[1], 0]);
+    Ok((frame, Terrain::new(&params.terrain, frame, params.seed)?))
+}
+
+/// One recorded return.
+struct Measured {
+    world: [f64; 3],
+    point: Point,
+    /// Number of its tree, 0 for none.
+    tree: u32,
 }
 
 /// A rectangle to be scanned.

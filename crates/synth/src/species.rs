@@ -1,6 +1,6 @@
 //! Species: how thick, high and wide they grow and how a laser beam sees their crowns.
 //!
-//! Sizes follow published regressions for the Pacific Northwest. What a crown looks like inside
+//! Sizes follow published regressions, but for one species those of the Pacific Northwest. What a crown looks like inside
 //! (porosity, branches, extinction) has no such source: those values were chosen so that the shares
 //! of ground, first and multiple returns lie in the range of real airborne scans.
 
@@ -43,6 +43,8 @@ pub enum Species {
     OregonWhiteOak,
     /// *Cornus nuttallii*, a small tree of the understorey.
     PacificDogwood,
+    /// *Picea abies*.
+    NorwaySpruce,
 }
 
 /// Constants of a species.
@@ -51,15 +53,30 @@ pub(crate) struct Traits {
     code: &'static str,
     name: &'static str,
     pub(crate) habit: Habit,
-    /// Curtis-Arney height: p2, p3, p4.
-    height: [f64; 3],
-    /// Maximum crown width: constant, linear, quadratic; and the diameter beyond which it stays, in.
-    width: [f64; 3],
-    width_limit_in: f64,
+    height: HeightCurve,
+    width: OpenWidth,
     /// Exponent of the crown ratio: constant, per ft of crown length, per in/ft of DBH to height.
     width_ratio: [f64; 3],
     pub(crate) shape: Shape,
     pub(crate) foliage: Foliage,
+}
+
+/// Mean total height over diameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum HeightCurve {
+    /// `4.5 + p2 exp(-p3 D^p4)`, ft and in: p2, p3, p4.
+    CurtisArney([f64; 3]),
+    /// `a / (1 + b / D + c / D²)`, m and cm: a, b, c.
+    Hyperbolic([f64; 3]),
+}
+
+/// Crown width of open-grown trees over diameter.
+#[derive(Debug, Clone, Copy, PartialEq)]
+enum OpenWidth {
+    /// Constant, linear, quadratic, ft and in; and the diameter beyond which it stays, in.
+    Quadratic([f64; 3], f64),
+    /// `exp(a + b ln D)`, m and cm: a, b.
+    Power([f64; 2]),
 }
 
 /// How the envelope of a crown is drawn; see [`crate::crown::Profile`].
@@ -135,9 +152,8 @@ const DOUGLAS_FIR: Traits = Traits {
     code: "PSME",
     name: "Pseudotsuga menziesii",
     habit: Habit::Conifer,
-    height: [439.1195, 5.8176, -0.4854],
-    width: [4.6198, 1.8426, -0.011311],
-    width_limit_in: 81.45,
+    height: HeightCurve::CurtisArney([439.1195, 5.8176, -0.4854]),
+    width: OpenWidth::Quadratic([4.6198, 1.8426, -0.011311], 81.45),
     width_ratio: [0.0, 0.004_363_24, 0.602_002],
     shape: CONIFER_SHAPE,
     foliage: CONIFER_FOLIAGE,
@@ -146,9 +162,8 @@ const GRAND_FIR: Traits = Traits {
     code: "ABGR",
     name: "Abies grandis",
     habit: Habit::Conifer,
-    height: [432.2186, 6.2941, -0.5028],
-    width: [6.188, 1.0069, 0.0],
-    width_limit_in: 999.99,
+    height: HeightCurve::CurtisArney([432.2186, 6.2941, -0.5028]),
+    width: OpenWidth::Quadratic([6.188, 1.0069, 0.0], 999.99),
     width_ratio: [0.0, 0.003_084_02, 0.0],
     shape: Shape { straight: [0.4, 0.7], upper: 0.92, ..CONIFER_SHAPE },
     foliage: Foliage { extinction_per_m: 2.2, porosity: 0.3, droop: 0.0, ..CONIFER_FOLIAGE },
@@ -157,9 +172,8 @@ const WESTERN_HEMLOCK: Traits = Traits {
     code: "TSHE",
     name: "Tsuga heterophylla",
     habit: Habit::Conifer,
-    height: [395.4976, 6.4222, -0.532],
-    width: [4.5652, 1.4147, 0.0],
-    width_limit_in: 76.7,
+    height: HeightCurve::CurtisArney([395.4976, 6.4222, -0.532]),
+    width: OpenWidth::Quadratic([4.5652, 1.4147, 0.0], 76.7),
     width_ratio: [0.105_59, 0.003_566_2, 0.0],
     shape: Shape { straight: [0.35, 0.65], upper: 0.9, lean_deg: 1.3, ..CONIFER_SHAPE },
     foliage: Foliage { roughness: 0.32, layering: 0.4, droop: 0.18, ..CONIFER_FOLIAGE },
@@ -168,9 +182,8 @@ const WESTERN_REDCEDAR: Traits = Traits {
     code: "THPL",
     name: "Thuja plicata",
     habit: Habit::Conifer,
-    height: [1012.127, 6.0957, -0.3083],
-    width: [4.0, 1.65, 0.0],
-    width_limit_in: 999.99,
+    height: HeightCurve::CurtisArney([1012.127, 6.0957, -0.3083]),
+    width: OpenWidth::Quadratic([4.0, 1.65, 0.0], 999.99),
     width_ratio: [-0.251_389, 0.006_925_12, 0.985_922],
     shape: Shape { straight: [0.3, 0.6], upper: 0.9, ..CONIFER_SHAPE },
     foliage: Foliage { layering: 0.3, droop: 0.2, porosity: 0.3, ..CONIFER_FOLIAGE },
@@ -179,9 +192,8 @@ const BIGLEAF_MAPLE: Traits = Traits {
     code: "ACMA3",
     name: "Acer macrophyllum",
     habit: Habit::Broadleaf,
-    height: [160.2171, 3.3044, -0.5299],
-    width: [4.0953, 2.3849, -0.010_265_1],
-    width_limit_in: 102.53,
+    height: HeightCurve::CurtisArney([160.2171, 3.3044, -0.5299]),
+    width: OpenWidth::Quadratic([4.0953, 2.3849, -0.010_265_1], 102.53),
     width_ratio: [0.0, 0.0, 1.470_18],
     shape: BROADLEAF_SHAPE,
     foliage: BROADLEAF_FOLIAGE,
@@ -190,9 +202,8 @@ const RED_ALDER: Traits = Traits {
     code: "ALRU2",
     name: "Alnus rubra",
     habit: Habit::Broadleaf,
-    height: [10_099.72, 7.6375, -0.1621],
-    width: [8.0, 1.53, 0.0],
-    width_limit_in: 999.99,
+    height: HeightCurve::CurtisArney([10_099.72, 7.6375, -0.1621]),
+    width: OpenWidth::Quadratic([8.0, 1.53, 0.0], 999.99),
     width_ratio: [0.322_714, 0.0, 0.0],
     shape: Shape { straight: [0.1, 0.35], round: 0.5, upper: 0.7, lean_deg: 2.5 },
     foliage: Foliage { porosity: 0.48, ..BROADLEAF_FOLIAGE },
@@ -201,9 +212,8 @@ const OREGON_WHITE_OAK: Traits = Traits {
     code: "QUGA4",
     name: "Quercus garryana",
     habit: Habit::Broadleaf,
-    height: [89.4301, 6.6321, -0.8876],
-    width: [3.0786, 1.9242, 0.0],
-    width_limit_in: 999.99,
+    height: HeightCurve::CurtisArney([89.4301, 6.6321, -0.8876]),
+    width: OpenWidth::Quadratic([3.0786, 1.9242, 0.0], 999.99),
     width_ratio: [0.364_811, 0.0, 0.0],
     shape: Shape { round: 0.9, ..BROADLEAF_SHAPE },
     foliage: BROADLEAF_FOLIAGE,
@@ -212,17 +222,29 @@ const PACIFIC_DOGWOOD: Traits = Traits {
     code: "CONU4",
     name: "Cornus nuttallii",
     habit: Habit::Broadleaf,
-    height: [444.5618, 3.9205, -0.2397],
-    width: [2.9794, 1.5512, -0.014_161],
-    width_limit_in: 54.77,
+    height: HeightCurve::CurtisArney([444.5618, 3.9205, -0.2397]),
+    width: OpenWidth::Quadratic([2.9794, 1.5512, -0.014_161], 54.77),
     width_ratio: [0.0, 0.0, 1.6144],
     shape: Shape { upper: 0.65, ..BROADLEAF_SHAPE },
     foliage: Foliage { whorl_m: 1.0, porosity: 0.5, ..BROADLEAF_FOLIAGE },
 };
+// Height: Pukkala, Lähde and Laiho 2009 (Forest Ecology and Management 258), Norway spruce on sites of
+// the Myrtillus type. Width of open-grown trees: Hasenauer 1997 (Forest Ecology and Management 96).
+// Its reduction by the crown ratio has no source for the species: that of Douglas-fir.
+const NORWAY_SPRUCE: Traits = Traits {
+    code: "PIAB",
+    name: "Picea abies",
+    habit: Habit::Conifer,
+    height: HeightCurve::Hyperbolic([33.726 + 5.965, 25.683, 37.785]),
+    width: OpenWidth::Power([-0.3232, 0.6441]),
+    width_ratio: [0.0, 0.004_363_24, 0.602_002],
+    shape: Shape { straight: [0.6, 0.9], upper: 0.9, ..CONIFER_SHAPE },
+    foliage: Foliage { extinction_per_m: 2.1, porosity: 0.32, droop: 0.2, ..CONIFER_FOLIAGE },
+};
 
 impl Species {
     /// All species, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::DouglasFir,
         Self::GrandFir,
         Self::WesternHemlock,
@@ -231,6 +253,7 @@ impl Species {
         Self::RedAlder,
         Self::OregonWhiteOak,
         Self::PacificDogwood,
+        Self::NorwaySpruce,
     ];
 
     pub(crate) const fn traits(self) -> &'static Traits {
@@ -243,6 +266,7 @@ impl Species {
             Self::RedAlder => &RED_ALDER,
             Self::OregonWhiteOak => &OREGON_WHITE_OAK,
             Self::PacificDogwood => &PACIFIC_DOGWOOD,
+            Self::NorwaySpruce => &NORWAY_SPRUCE,
         }
     }
 
@@ -267,11 +291,19 @@ impl Species {
     /// Mean total height in metres of a diameter at breast height.
     ///
     /// Curtis-Arney form `4.5 + p2 exp(-p3 D^p4)` (feet, inches), straight from 4.51 ft at 0.3 in
-    /// to its value at 3 in (FVS Staff 2008, Pacific Northwest Coast variant, section 4.1).
+    /// to its value at 3 in (FVS Staff 2008, Pacific Northwest Coast variant, section 4.1). Norway
+    /// spruce: the curve of Pukkala et al. 2009, straight below 3 in likewise.
     #[must_use]
     pub fn height_m(self, dbh_cm: f64) -> f64 {
-        let [p2, p3, p4] = self.traits().height;
-        let curve = |d_in: f64| BREAST_HEIGHT_FT + p2 * libm::exp(-p3 * libm::pow(d_in, p4));
+        let curve = |d_in: f64| match self.traits().height {
+            HeightCurve::CurtisArney([p2, p3, p4]) => {
+                BREAST_HEIGHT_FT + p2 * libm::exp(-p3 * libm::pow(d_in, p4))
+            }
+            HeightCurve::Hyperbolic([a, b, c]) => {
+                let d = d_in * CM_PER_IN;
+                a / (1.0 + b / d + c / (d * d)) / M_PER_FT
+            }
+        };
         let d_in = dbh_cm / CM_PER_IN;
         let height_ft = if d_in >= 3.0 {
             curve(d_in)
@@ -287,10 +319,14 @@ impl Species {
     #[must_use]
     pub fn crown_width_m(self, dbh_cm: f64, height_m: f64, crown_ratio: f64) -> f64 {
         let traits = self.traits();
-        let [a0, a1, a2] = traits.width;
         let dbh_in = dbh_cm / CM_PER_IN;
-        let d = dbh_in.min(traits.width_limit_in);
-        let open_ft = a0 + a1 * d + a2 * d * d;
+        let open_ft = match traits.width {
+            OpenWidth::Quadratic([a0, a1, a2], limit_in) => {
+                let d = dbh_in.min(limit_in);
+                a0 + a1 * d + a2 * d * d
+            }
+            OpenWidth::Power([a, b]) => libm::exp(a + b * libm::log(dbh_cm)) / M_PER_FT,
+        };
         let height_ft = height_m / M_PER_FT;
         let [b1, b2, b3] = traits.width_ratio;
         let exponent = b1 + b2 * crown_ratio * height_ft + b3 * dbh_in / height_ft;
@@ -310,6 +346,9 @@ mod tests {
         // An open-grown tree (crown ratio 1) has the maximum crown width.
         let open = Species::DouglasFir.crown_width_m(25.4, 20.0, 1.0) / 0.3048;
         assert!((open - (4.6198 + 18.426 - 1.1311)).abs() < 1e-9);
+        // Norway spruce of 25 cm: 39.691 / 2.087776 m; open-grown width e^-0.3232 25^0.6441 m.
+        assert!((Species::NorwaySpruce.height_m(25.0) - 19.011_139).abs() < 1e-5);
+        assert!((Species::NorwaySpruce.crown_width_m(25.0, 19.0, 1.0) - 5.755051).abs() < 1e-5);
     }
 
     #[test]

@@ -4,7 +4,8 @@
 
 use timberline_pointcloud::{PointCloud, Rect};
 use timberline_synth::{
-    Crown, ScannerParams, Scene, SceneParams, Stand, StandParams, TerrainParams, Undergrowth,
+    Crown, Forest, ScannerParams, Scene, SceneParams, Stand, StandParams, TerrainParams,
+    Undergrowth,
 };
 
 const CORNER: [f64; 2] = [431_000.0, 5_206_000.0];
@@ -192,4 +193,39 @@ fn faults_are_named() {
     wide.scanner.half_angle_deg = 40.0;
     let message = Scene::new(wide).unwrap_err().to_string();
     assert_eq!(message, "`half_angle_deg` is 40; expected 1 to 28 degrees");
+}
+
+#[test]
+fn points_know_their_trees() {
+    let (scene, plain) = exact(StandParams::multilayer_mixed(), 60.0);
+    let (cloud, trees) = scene.labelled_points_in(&scene.params().area);
+    assert_eq!(cloud, plain);
+    assert_eq!(trees.len(), cloud.len());
+    let mut own = 0;
+    for (i, &id) in trees.iter().enumerate().filter(|(_, id)| **id > 0) {
+        let tree = &scene.forest().trees[id as usize - 1];
+        let [x, y, z] = scene.frame().local_from_world(cloud.world(i));
+        let up = (z - tree.base_m[2]) / tree.height_m;
+        let axis: [f64; 2] =
+            std::array::from_fn(|a| tree.base_m[a] + up * (tree.crown.top_m[a] - tree.base_m[a]));
+        let off = [x - axis[0], y - axis[1]];
+        let on_stem = off[0] * off[0] + off[1] * off[1] < 0.36;
+        // A return is the mean of up to five hits, at most a pulse's length apart.
+        assert!(on_stem || tree.crown.contains([x, y, z], 0.4), "{id} {x} {y} {z}");
+        own += 1;
+    }
+    assert!(own * 3 > cloud.len(), "{own} of {}", cloud.len());
+}
+
+#[test]
+fn given_trees_stand_where_they_are_put() {
+    let (scene, cloud) = exact(StandParams::open_conifer(), 60.0);
+    let mut trees = scene.forest().trees.clone();
+    let again = Scene::with_forest(scene.params().clone(), Forest::of(trees.clone())).unwrap();
+    assert_eq!(again.points_in(&scene.params().area), cloud);
+    let (left, _) = scene.labelled_points_in(&scene.params().area);
+    trees.retain(|tree| tree.id != 1);
+    let less = Scene::with_forest(scene.params().clone(), Forest::of(trees)).unwrap();
+    assert!(less.points_in(&scene.params().area).len() < left.len());
+    assert_eq!(less.forest().trees[0].id, 1);
 }
