@@ -39,10 +39,10 @@ fn as_file(bytes: &[u8]) {
     }
 }
 
-fn header<K: Kind>() -> Header {
+fn header<K: Kind>(kind_version: u32) -> Header {
     Header {
         kind: K::NAME.to_owned(),
-        kind_version: K::VERSION,
+        kind_version,
         key: "0".repeat(32),
         stage: "fuzz".to_owned(),
         stage_version: 1,
@@ -56,8 +56,12 @@ fn header<K: Kind>() -> Header {
 }
 
 fn sealed<K: Kind>(payload: &[u8]) {
+    K::READABLE.iter().for_each(|version| sealed_as::<K>(*version, payload));
+}
+
+fn sealed_as<K: Kind>(version: u32, payload: &[u8]) {
     let Ok(mut file) = tempfile::NamedTempFile::new() else { return };
-    let Ok(json) = header::<K>().to_json() else { return };
+    let Ok(json) = header::<K>(version).to_json() else { return };
     let written = ContainerWriter::new(&mut file).and_then(|mut writer| {
         writer.write_all(payload)?;
         writer.finish(&json).map(drop)

@@ -6,7 +6,7 @@ use crate::surface::{AxisBounds, EqualAxis, Fit, Flag, Prior, Problem, fit, thin
 use crate::{Error, Window, base, edge, footprint};
 use rayon::prelude::*;
 use timberline_artefact::kinds::{
-    CrownModel, CrownModels, CrownShape, CrownStatus, PositionSource, Tree, TreeFlag, Trees,
+    CrownModel, CrownModels, CrownShape, CrownStatus, PositionMethod, Tree, TreeFlag, Trees,
     Treetop, Treetops,
 };
 use timberline_artefact::stage::{
@@ -215,7 +215,7 @@ fn check_reach(models: &[CrownModel], reach_m: f64) -> Result<(), Error> {
 }
 
 fn facts(located: Facts, trees: &[Tree]) -> Facts {
-    let fitted = |tree: &&Tree| tree.position_source == PositionSource::CrownFit;
+    let fitted = |tree: &&Tree| tree.position_method == PositionMethod::L1;
     let accepted = |tree: &&Tree| tree.status == CrownStatus::Accepted;
     located
         .count("trees", trees.len())
@@ -278,9 +278,6 @@ fn blank_row(model: &CrownModel) -> Tree {
         apex_m: model.apex_m,
         ground_m: quantise(model.apex_m[2] - model.height_m),
         height_m: model.height_m,
-        position_uncertainty_m: f64::NAN,
-        semi_axes_m: [f64::NAN; 2],
-        fit_residual_m: f64::NAN,
         shape: model.shape,
         parameters: model.parameters,
         status: model.status,
@@ -288,7 +285,7 @@ fn blank_row(model: &CrownModel) -> Tree {
         inliers: model.inliers,
         outliers: model.outliers,
         crown_base_m: f64::NAN,
-        ..Tree::default()
+        ..Tree::without_fit()
     }
 }
 
@@ -329,9 +326,9 @@ fn add_fit(
         tree.semi_axes_m = shape.semiaxes_m;
     }
     tree.fit_residual_m = solution.objective_m / *cells as f64;
-    tree.position_uncertainty_m = found.standard_error_m.unwrap_or(f64::NAN);
+    tree.position_standard_error_m = found.standard_error_m.unwrap_or(f64::NAN);
     if !found.flags.contains(&Flag::CentreOutsideData) {
-        tree.position_source = PositionSource::CrownFit;
+        tree.position_method = PositionMethod::L1;
         tree.position_m = [0, 1].map(|axis| quantise(tree.apex_m[axis] + found.position[axis]));
     }
 }

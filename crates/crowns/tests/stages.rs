@@ -135,7 +135,7 @@ fn every_treetop_has_a_row_and_most_a_crown() {
     assert!(accepted >= 60, "{accepted}");
     let seedling = tree_id(CORNER[0] + 47.0, CORNER[1] + 47.0);
     let row = trees.iter().find(|tree| tree.id == seedling).unwrap();
-    assert_eq!(row.position_source, PositionSource::HighestPoint);
+    assert_eq!(row.position_method, PositionMethod::HighestPoint);
     assert_eq!((row.height_m, row.ground_m), (3.0, 100.0));
     assert!(TreeFlag::names(row.flags).contains("model-rejected"), "{row:?}");
     assert!(warnings.iter().any(|w| w.contains(&seedling.to_string()) && w.contains("too few")));
@@ -151,7 +151,7 @@ fn positions_are_nearer_to_the_stem_than_the_highest_points() {
         let off = |p: [f64; 2]| libm::hypot(p[0] - at[0], p[1] - at[1]);
         let tree =
             trees.iter().min_by(|a, b| off(a.position_m).total_cmp(&off(b.position_m))).unwrap();
-        if tree.position_source == PositionSource::CrownFit && tree.status == CrownStatus::Accepted
+        if tree.position_method == PositionMethod::L1 && tree.status == CrownStatus::Accepted
         {
             fitted += off(tree.position_m);
             highest += off([tree.apex_m[0], tree.apex_m[1]]);

@@ -1,7 +1,8 @@
 //! `trees.csv` and its dictionary.
 
 use crate::Error;
-use crate::table::{Kind, TREE_COLUMNS};
+use crate::table::Kind;
+use crate::tree_columns::TREE_COLUMNS;
 use std::io::Write;
 use std::path::Path;
 use timberline_artefact::Crs;
@@ -56,13 +57,18 @@ mod tests {
     #[test]
     fn a_row_has_a_value_for_every_column() {
         let mut bytes = Vec::new();
-        let tree =
-            Tree { id: 7, ground_m: f64::NAN, height_m: 21.5, flags: 0b1_1000, ..Tree::default() };
+        let tree = Tree {
+            id: 7,
+            ground_m: f64::NAN,
+            height_m: 21.5,
+            flags: 0b1_1000,
+            ..Tree::without_fit()
+        };
         let trees = [Ok(tree)].into_iter();
         write_trees(&mut bytes, Path::new("t.csv"), &Crs::default(), trees).unwrap();
         let text = String::from_utf8(bytes).unwrap();
-        let expected = "7,0.000,0.000,0.000,,21.50,0.000,0.000,highest-point,0.00,0.00,0.00,0.00,\
-                        0.00,0.00,0.00,0.00,0.000,mixed,0.00000,0.00000,accepted,0,0,0,\
+        let expected = "7,0.000,0.000,0.000,,21.50,0.000,0.000,highest-point,,,0.00,0.00,0.00,\
+                        0.00,0.00,,,,,,,0,,,,0,mixed,0.00000,0.00000,accepted,0,0,0,\
                         centre-outside-data one-sided";
         assert_eq!(text.lines().nth(1), Some(expected));
         assert_eq!(text.lines().count(), 2);

@@ -1,7 +1,7 @@
 //! The layers of `trees.gpkg`.
 
 use crate::gpkg::{Geometry, Layer};
-use crate::table::TREE_COLUMNS;
+use crate::tree_columns::TREE_COLUMNS;
 
 /// The highest point of every tree.
 pub const TREETOPS: Layer<'static> = Layer {

@@ -22,6 +22,7 @@ pub mod mosaic;
 pub mod sorted_trees;
 pub mod stage;
 pub mod table;
+pub mod tree_columns;
 pub mod vrt;
 
 pub use error::Error;

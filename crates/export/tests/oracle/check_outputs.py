@@ -46,8 +46,42 @@ def read_table(folder):
             if text and kind.startswith("number"):
                 decimals = int(kind.split(",")[1].split()[0])
                 expect(len(text.split(".")[1]) == decimals, f"trees.csv: {name} = {text}")
+    check_fits(rows, dictionary)
     print(f"trees.csv          {len(rows)} trees, {len(dictionary)} columns")
     return rows
+
+
+def check_fits(rows, dictionary):
+    """trees.csv: what is said about the fitted surfaces agrees with itself."""
+
+    def words(column):
+        return set(dictionary[column]["range"].split(", "))
+
+    def number(row, name):
+        return float(row[name]) if row[name] else None
+
+    fitted = 0
+    for row in rows:
+        tree = f"trees.csv: tree {row['tree_id']}"
+        expect(row["stem_source"] in words("stem_source"), f"{tree}: {row['stem_source']}")
+        expect(set(row["flags"].split()) <= words("flags"), f"{tree}: {row['flags']}")
+        larger, smaller = number(row, "semi_axis_a_m"), number(row, "semi_axis_b_m")
+        expect((larger is None) == (smaller is None), f"{tree}: one semi-axis only")
+        rotation = number(row, "rotation_deg")
+        if rotation is not None:
+            expect(larger is not None, f"{tree}: a rotation without axes")
+            expect(0.0 <= rotation < 180.0, f"{tree}: rotation of {rotation} degrees")
+        if larger is not None:
+            expect(larger >= smaller > 0.0, f"{tree}: semi-axes {larger} and {smaller}")
+            expect(row["surface_x"] and row["surface_z"], f"{tree}: axes without a centre")
+        gap = number(row, "fit_gap")
+        expect(gap is None or gap <= 1e-6, f"{tree}: certified gap {gap}")
+        total, mean = number(row, "fit_objective_m"), number(row, "fit_residual_m")
+        if total is not None:
+            off = abs(total - mean * int(row["fit_cells"]))
+            expect(off <= 0.0005 * (int(row["fit_cells"]) + 2), f"{tree}: {mean} is no mean of {total}")
+        fitted += row["stem_source"] in ("l1", "l2")
+    print(f"trees.csv          {fitted} stems from a fitted surface")
 
 
 def check_package(folder, rows):
@@ -68,7 +102,7 @@ def check_package(folder, rows):
         if layer == "treetops":
             expect(ids == list(by_id), "treetops: not the trees of trees.csv")
         expect(set(ids) <= set(by_id), f"{layer}: unknown trees")
-        for name in ["x", "y", "height_m", "crown_area_m2"]:
+        for name in ["x", "y", "height_m", "crown_area_m2", "stem_uncertainty_m", "rotation_deg"]:
             table = np.array([float(by_id[i][name] or "nan") for i in ids])
             same = np.allclose(columns[name].astype(float), table, atol=1e-9, equal_nan=True)
             expect(same, f"{layer}: {name} differs from trees.csv")

@@ -4,7 +4,7 @@
 
 use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::{
-    GroundModel, GroundPoints, Heights, Labels, PointTile, PositionSource, Tree, Trees,
+    GroundModel, GroundPoints, Heights, Labels, PointTile, PositionMethod, Tree, Trees,
 };
 use timberline_artefact::stage::Campaign;
 use timberline_artefact::{Crs, Facts, Raster, UnitId, tree_id};
@@ -65,7 +65,18 @@ fn tree(stem: &[f64; 3]) -> Tree {
         ground_m: ground,
         height_m: height,
         position_m: [x + 0.1, y],
-        position_source: PositionSource::CrownFit,
+        position_method: PositionMethod::L1,
+        position_extent_m: 0.05,
+        position_standard_error_m: 0.125,
+        surface_centre_m: [x + 0.1, y],
+        surface_apex_m: ground + height,
+        semi_axes_m: [1.5, 1.25],
+        rotation_deg: x % 180.0,
+        fit_cells: 60,
+        fit_objective_m: 9.0,
+        fit_residual_m: 0.15,
+        fit_gap: 2.5e-7,
+        fit_nodes: 3,
         crown_radius_m: RADIUS_M,
         crown_area_m2: 49.0,
         crown_m: (0..16).map(corner).collect(),
