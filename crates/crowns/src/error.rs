@@ -18,7 +18,26 @@ pub enum Error {
     /// No cell at all: nothing carries weight.
     #[error("the crown's surface has no cells")]
     NoCells,
-    /// A bound on the paraboloid's semiaxes that no paraboloid can meet.
+    /// Weights that are not one for each cell.
+    #[error("{weights} weights for {cells} cells of the crown's surface")]
+    WeightCount {
+        /// Number of cells.
+        cells: usize,
+        /// Number of weights.
+        weights: usize,
+    },
+    /// A weight that is negative or not a number.
+    #[error("cell {index} of the crown's surface has the weight {value}: weights are 0 or more")]
+    Weight {
+        /// Index of the cell.
+        index: usize,
+        /// The value given.
+        value: f64,
+    },
+    /// An imbalance of the axes outside its range.
+    #[error("omega {0} is not between 0 (equal axes) and 1 (free axes)")]
+    Omega(f64),
+    /// Bounds on the paraboloid's semiaxes that no paraboloid can meet.
     #[error(
         "semiaxis bounds {smallest} m to {largest} m: both must be positive, the first the smaller"
     )]
@@ -28,9 +47,27 @@ pub enum Error {
         /// Largest semiaxis allowed, m.
         largest: f64,
     },
+    /// A bound after equation 15 of Polewski et al. that makes mu infinite or not positive.
+    #[error(
+        "largest axis {largest} m with omega {omega}: the paper's bound needs a positive axis and omega below 1 (use exact axis bounds for omega 1)"
+    )]
+    PaperBound {
+        /// b_max, m.
+        largest: f64,
+        /// Largest imbalance of the axes.
+        omega: f64,
+    },
     /// A prior box that is inside out or not a number.
-    #[error("half width {0} m of the position prior is negative or not a number")]
-    PriorWidth(f64),
+    #[error(
+        "position prior at ({}, {}) with half width {half_width} m: all must be numbers, the last 0 or more",
+        .centre[0], .centre[1]
+    )]
+    Prior {
+        /// Middle of the box, m.
+        centre: [f64; 2],
+        /// Half its edge, m.
+        half_width: f64,
+    },
     /// A cell size that is not a positive number.
     #[error("cell size {0} m is not a positive finite number")]
     CellSize(f64),

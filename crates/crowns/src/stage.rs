@@ -2,7 +2,7 @@
 
 use crate::params::{CrownFitParams, CrownModelParams, Returns};
 use crate::starsac::{self, Outcome, Rejection, Shape};
-use crate::surface::{AxisBounds, EqualAxis, Fit, Flag, Prior, Problem, fit, thin};
+use crate::surface::{AxisBounds, Fit, Flag, L1, Method, Prior, Problem, Uncertainty, thin};
 use crate::{Error, Window, base, edge, footprint};
 use rayon::prelude::*;
 use timberline_artefact::kinds::{
@@ -295,16 +295,20 @@ fn position(
     points: &[u32],
     near: &Surroundings,
     params: &CrownFitParams,
-) -> Result<(Fit, usize), Error> {
+) -> Result<(Fit, Option<Uncertainty>, usize), Error> {
     let on_surface = points.iter().filter(|&&i| near.score[i as usize] > ON_SURFACE);
     let world = on_surface.map(|&i| near.cloud.world(i as usize));
     let cells = thin(world, model.apex_m, params.cell_m)?;
-    let problem = Problem {
-        cells: &cells,
-        axes: AxisBounds { largest_m: params.largest_axis_m, smallest_m: params.smallest_axis_m },
-        prior: Some(Prior { centre: [0.0; 2], half_width_m: params.prior_half_width_m }),
+    let bounds = AxisBounds::Exact {
+        smallest_m: params.smallest_axis_m,
+        largest_m: params.largest_axis_m,
     };
-    Ok((fit(&problem, &EqualAxis)?, cells.len()))
+    let prior = Prior { centre: [0.0; 2], half_width_m: params.prior_half_width_m };
+    let problem = Problem::new(&cells).with_prior(prior);
+    let method = L1 { bounds, ..L1::default() };
+    let found = method.fit(&problem)?;
+    let uncertainty = method.uncertainty(&problem, &found)?;
+    Ok((found, uncertainty, cells.len()))
 }
 
 fn warn_unfitted(id: u64, reason: &str, context: &Context<'_>) {
@@ -313,20 +317,20 @@ fn warn_unfitted(id: u64, reason: &str, context: &Context<'_>) {
 
 fn add_fit(
     tree: &mut Tree,
-    (found, cells): &(Fit, usize),
+    (found, uncertainty, cells): &(Fit, Option<Uncertainty>, usize),
     flags: &mut Vec<TreeFlag>,
     context: &Context<'_>,
 ) {
     flags.extend(found.flags.iter().map(|flag| wire_flag(*flag)));
-    let Some(solution) = &found.solution else {
+    let (Some(surface), Some(certificate)) = (&found.surface, &found.certificate) else {
         let reason = format!("{cells} cells do not determine a surface");
         return warn_unfitted(tree.id, &reason, context);
     };
-    if let Some(shape) = solution.paraboloid.shape() {
+    if let Some(shape) = surface.paraboloid().and_then(|paraboloid| paraboloid.shape()) {
         tree.semi_axes_m = shape.semiaxes_m;
     }
-    tree.fit_residual_m = solution.objective_m / *cells as f64;
-    tree.position_standard_error_m = found.standard_error_m.unwrap_or(f64::NAN);
+    tree.fit_residual_m = certificate.mean_residual_m();
+    tree.position_standard_error_m = uncertainty.map_or(f64::NAN, |found| found.standard_error_m);
     if !found.flags.contains(&Flag::CentreOutsideData) {
         tree.position_method = PositionMethod::L1;
         tree.position_m = [0, 1].map(|axis| quantise(tree.apex_m[axis] + found.position[axis]));
@@ -341,6 +345,8 @@ fn wire_flag(flag: Flag) -> TreeFlag {
         Flag::PriorActive => TreeFlag::PriorActive,
         Flag::CentreOutsideData => TreeFlag::CentreOutsideData,
         Flag::OneSided => TreeFlag::OneSided,
+        Flag::ImbalanceActive => TreeFlag::ImbalanceActive,
+        Flag::NotElliptic => TreeFlag::NotElliptic,
     }
 }
 

@@ -1,5 +1,7 @@
 //! The elliptic paraboloid: coefficients to shape and back.
 
+use super::scale::Scale;
+
 /// z = phi0 x² + phi1 y² + phi2 xy + phi3 x + phi4 y + phi5, opening downward
 /// (Polewski et al., eq 1).
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,19 +24,35 @@ pub struct Shape {
 }
 
 impl Paraboloid {
+    /// The surface with the given curvatures phi0 to phi2 about an apex.
+    pub(super) fn from_apex([p0, p1, p2]: [f64; 3], [x, y]: [f64; 2], top: f64) -> Self {
+        let phi3 = -2.0 * p0 * x - p2 * y;
+        let phi4 = -p2 * x - 2.0 * p1 * y;
+        let phi5 = top + p0 * x * x + p1 * y * y + p2 * x * y;
+        Self { phi: [p0, p1, p2, phi3, phi4, phi5] }
+    }
+
+    /// The same surface in metres, if its coefficients are in units of a scale.
+    pub(super) fn in_metres(&self, scale: &Scale) -> Self {
+        let (l, h, [x0, y0, z0]) = (scale.length_m, scale.height_m, scale.centre);
+        let [p0, p1, p2] = [0, 1, 2].map(|k| self.phi[k] * h / (l * l));
+        let [g0, g1] = [3, 4].map(|k| self.phi[k] * h / l);
+        let phi3 = g0 - 2.0 * p0 * x0 - p2 * y0;
+        let phi4 = g1 - p2 * x0 - 2.0 * p1 * y0;
+        let about = p0 * x0 * x0 + p1 * y0 * y0 + p2 * x0 * y0;
+        let phi5 = self.phi[5] * h + z0 + about - g0 * x0 - g1 * y0;
+        Self { phi: [p0, p1, p2, phi3, phi4, phi5] }
+    }
+
     /// The surface with the given shape.
     #[must_use]
     pub fn from_shape(shape: &Shape) -> Self {
-        let [x, y] = shape.centre;
         let [u, v] = shape.semiaxes_m.map(|axis| 1.0 / (axis * axis));
         let (sin, cos) = libm::sincos(shape.azimuth);
         let phi0 = -(cos * cos * u + sin * sin * v);
         let phi1 = -(sin * sin * u + cos * cos * v);
         let phi2 = -2.0 * sin * cos * (u - v);
-        let phi3 = -2.0 * phi0 * x - phi2 * y;
-        let phi4 = -phi2 * x - 2.0 * phi1 * y;
-        let phi5 = shape.apex_z_m + phi0 * x * x + phi1 * y * y + phi2 * x * y;
-        Self { phi: [phi0, phi1, phi2, phi3, phi4, phi5] }
+        Self::from_apex([phi0, phi1, phi2], shape.centre, shape.apex_z_m)
     }
 
     /// Height of the surface at a position, m.

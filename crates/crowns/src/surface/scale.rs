@@ -1,9 +1,12 @@
 //! Centring and scaling: without it solvers stop early on world coordinates.
 
-/// What was subtracted and divided by.
+use super::bounds::Limits;
+use super::problem::{Cell, Prior};
+
+/// What is subtracted and divided by.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Scale {
-    /// Mean of the cells, m.
+    /// Weighted mean of the cells, m.
     pub(super) centre: [f64; 3],
     /// Root mean square distance from the centre in the plane, m.
     pub(super) length_m: f64,
@@ -11,37 +14,102 @@ pub(super) struct Scale {
     pub(super) height_m: f64,
 }
 
-/// Mean position of the cells.
-pub(super) fn mean(cells: &[[f64; 3]]) -> [f64; 3] {
-    let count = cells.len().max(1) as f64;
-    let add = |sum: [f64; 3], cell: &[f64; 3]| std::array::from_fn(|axis| sum[axis] + cell[axis]);
-    cells.iter().fold([0.0; 3], add).map(|sum| sum / count)
+/// Weighted mean position of the cells.
+pub(super) fn mean(cells: &[Cell]) -> [f64; 3] {
+    let total: f64 = cells.iter().map(|cell| cell[3]).sum();
+    let add =
+        |sum: [f64; 3], cell: &Cell| std::array::from_fn(|axis| sum[axis] + cell[3] * cell[axis]);
+    cells.iter().fold([0.0; 3], add).map(|sum| sum / total)
 }
 
 impl Scale {
     /// The scale of a crown's cells.
-    pub(super) fn of(cells: &[[f64; 3]]) -> Self {
+    pub(super) fn of(cells: &[Cell]) -> Self {
         let centre = mean(cells);
-        let count = cells.len().max(1) as f64;
-        let square = |cell: &[f64; 3], axis: usize| {
-            (cell[axis] - centre[axis]) * (cell[axis] - centre[axis])
-        };
-        let plane: f64 = cells.iter().map(|cell| square(cell, 0) + square(cell, 1)).sum();
-        let height: f64 = cells.iter().map(|cell| square(cell, 2)).sum();
+        let (mut total, mut squares) = (0.0, [0.0; 3]);
+        for cell in cells {
+            total += cell[3];
+            for (axis, sum) in squares.iter_mut().enumerate() {
+                let offset = cell[axis] - centre[axis];
+                *sum += cell[3] * offset * offset;
+            }
+        }
+        let root = |sum: f64| if sum > 0.0 { (sum / total).sqrt() } else { 1.0 };
         let positive = |value: f64| if value > 1e-9 { value } else { 1.0 };
         Self {
             centre,
-            length_m: positive((plane / count).sqrt()),
-            height_m: positive((height / count).sqrt()),
+            length_m: positive(root(squares[0] + squares[1])),
+            height_m: positive(root(squares[2])),
         }
     }
 
-    /// The cells in units of the scale.
-    pub(super) fn apply(&self, cells: &[[f64; 3]]) -> Vec<[f64; 3]> {
-        let unit = [self.length_m, self.length_m, self.height_m];
-        cells
-            .iter()
-            .map(|cell| std::array::from_fn(|axis| (cell[axis] - self.centre[axis]) / unit[axis]))
-            .collect()
+    /// The cells in units of the scale, weights as they are.
+    pub(super) fn apply(&self, cells: &[Cell]) -> Vec<Cell> {
+        let ([x0, y0, z0], l, h) = (self.centre, self.length_m, self.height_m);
+        cells.iter().map(|&[x, y, z, w]| [(x - x0) / l, (y - y0) / l, (z - z0) / h, w]).collect()
+    }
+}
+
+/// A paraboloid by its apex, in scaled units: z = top + phi0 dx² + phi1 dy² + phi2 dx dy.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Apex {
+    pub(super) curvature: [f64; 3],
+    pub(super) centre: [f64; 2],
+    pub(super) top: f64,
+}
+
+impl Apex {
+    /// From coefficients phi0 to phi5.
+    pub(super) fn from_phi([p0, p1, p2, p3, p4, p5]: [f64; 6]) -> Self {
+        let det = 4.0 * p0 * p1 - p2 * p2;
+        let (x, y) = ((p2 * p4 - 2.0 * p1 * p3) / det, (p2 * p3 - 2.0 * p0 * p4) / det);
+        let top = p5 - (p0 * x * x + p1 * y * y + p2 * x * y);
+        Self { curvature: [p0, p1, p2], centre: [x, y], top }
+    }
+
+    fn z(&self, x: f64, y: f64) -> f64 {
+        let ([p0, p1, p2], [cx, cy]) = (self.curvature, self.centre);
+        let (dx, dy) = (x - cx, y - cy);
+        self.top + p0 * dx * dx + p1 * dy * dy + p2 * dx * dy
+    }
+}
+
+/// A problem in scaled units.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Scaled {
+    pub(super) scale: Scale,
+    pub(super) cells: Vec<Cell>,
+    pub(super) limits: Limits,
+}
+
+impl Scaled {
+    /// `limits` in 1/m.
+    pub(super) fn new(cells: &[Cell], limits: Limits) -> Self {
+        let scale = Scale::of(cells);
+        let factor = scale.length_m * scale.length_m / scale.height_m;
+        Self { scale, cells: scale.apply(cells), limits: limits.scaled(factor) }
+    }
+
+    /// Lower and upper corner of a prior box in scaled units.
+    pub(super) fn corners(&self, prior: &Prior) -> [[f64; 2]; 2] {
+        prior.corners().map(|corner| self.position(corner))
+    }
+
+    pub(super) fn position(&self, at_m: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| (at_m[axis] - self.scale.centre[axis]) / self.scale.length_m)
+    }
+
+    pub(super) fn objective(&self, surface: &Apex) -> f64 {
+        self.cells.iter().map(|&[x, y, z, w]| w * (surface.z(x, y) - z).abs()).sum()
+    }
+
+    /// Back to metres in the problem's frame: curvatures in 1/m, centre and top.
+    pub(super) fn in_metres(&self, surface: &Apex) -> Apex {
+        let Scale { centre, length_m: l, height_m: h } = self.scale;
+        Apex {
+            curvature: surface.curvature.map(|c| c * h / (l * l)),
+            centre: [0, 1].map(|axis| surface.centre[axis] * l + centre[axis]),
+            top: surface.top * h + centre[2],
+        }
     }
 }
