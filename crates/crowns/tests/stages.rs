@@ -151,8 +151,7 @@ fn positions_are_nearer_to_the_stem_than_the_highest_points() {
         let off = |p: [f64; 2]| libm::hypot(p[0] - at[0], p[1] - at[1]);
         let tree =
             trees.iter().min_by(|a, b| off(a.position_m).total_cmp(&off(b.position_m))).unwrap();
-        if tree.position_method == PositionMethod::L1 && tree.status == CrownStatus::Accepted
-        {
+        if tree.position_method == PositionMethod::L1 && tree.status == CrownStatus::Accepted {
             fitted += off(tree.position_m);
             highest += off([tree.apex_m[0], tree.apex_m[1]]);
             count += 1.0;

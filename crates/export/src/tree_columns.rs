@@ -208,7 +208,7 @@ pub const TREE_COLUMNS: &[Column] = &[
         Kind::Integer,
         Unit::None,
         POSITIVE,
-        "Cells of the thinned crown that the fit saw; 0 without a fit",
+        "Cells of the thinned crown that the fit saw (of a consensus model: points); 0 without a surface",
         |tree, _| Value::Integer(i64::from(tree.fit_cells)),
     ),
     column(
@@ -304,7 +304,7 @@ pub const TREE_COLUMNS: &[Column] = &[
         Kind::Text,
         Unit::None,
         "underdetermined, no-redundancy, shape-bound-active, centre-outside-data, one-sided, \
-         prior-active, imbalance-active, model-rejected, at-survey-edge, not-elliptic",
+         prior-active, imbalance-active, model-rejected, at-survey-edge, not-elliptic, fit-failed",
         "What to know about the tree, words separated by spaces",
         |tree, _| Value::Text(TreeFlag::names(tree.flags)),
     ),

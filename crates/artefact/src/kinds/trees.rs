@@ -71,11 +71,13 @@ pub enum TreeFlag {
     AtSurveyEdge = 8,
     /// The best surface is no elliptic paraboloid that opens downward, and has no apex.
     NotElliptic = 9,
+    /// The fit stopped with an error, which is among the warnings.
+    FitFailed = 10,
 }
 
 impl TreeFlag {
     /// All flags.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Underdetermined,
         Self::NoRedundancy,
         Self::ShapeBoundActive,
@@ -86,6 +88,7 @@ impl TreeFlag {
         Self::ModelRejected,
         Self::AtSurveyEdge,
         Self::NotElliptic,
+        Self::FitFailed,
     ];
 
     /// The flag's bit.
@@ -108,6 +111,7 @@ impl TreeFlag {
             Self::ModelRejected => "model-rejected",
             Self::AtSurveyEdge => "at-survey-edge",
             Self::NotElliptic => "not-elliptic",
+            Self::FitFailed => "fit-failed",
         }
     }
 
@@ -139,8 +143,8 @@ pub struct Tree {
     pub position_extent_m: f64,
     /// Asymptotic standard error of the position, metres (both axes together); NaN without one.
     pub position_standard_error_m: f64,
-    /// World position of the fitted surface's centre, metres; NaN without a surface. It is the
-    /// position, unless the flags say why not.
+    /// World position of the fitted surface's centre, metres; NaN without a surface that has one. It
+    /// is the position, unless the flags say why not.
     pub surface_centre_m: [f64; 2],
     /// Elevation of the fitted surface at its centre, metres; NaN without a surface.
     pub surface_apex_m: f64,
@@ -150,11 +154,11 @@ pub struct Tree {
     /// Rotation of the fitted surface: azimuth of its larger semi-axis, degrees clockwise from grid
     /// north, at least 0 and below 180; NaN for equal axes and without a surface.
     pub rotation_deg: f64,
-    /// Cells of the thinned crown that the fit saw; 0 without a fit.
+    /// Cells of the thinned crown that the fit saw (of a consensus model: points); 0 without a surface.
     pub fit_cells: u32,
     /// Sum of the cells' absolute vertical residuals, metres; NaN without a surface.
     pub fit_objective_m: f64,
-    /// Mean of the cells' absolute vertical residuals, metres; NaN without a surface.
+    /// Mean of these residuals, metres; NaN without a surface.
     pub fit_residual_m: f64,
     /// Certified relative gap: no surface has an objective smaller by more than this share; NaN for
     /// methods without a certificate.
