@@ -135,12 +135,31 @@ mod architecture {
 
     #[test]
     fn rule_1_every_crate_has_its_place() {
-        let known = ["pointcloud", "artefact", "synth", "xtask"];
+        let known = ["pointcloud", "artefact", "synth", "experiment", "xtask"];
         let place =
             |name: &String| known.contains(&name.as_str()) || STAGE_CRATES.contains(&name.as_str());
         let lost: Vec<String> = crates().into_iter().filter(|name| !place(name)).collect();
         assert!(lost.is_empty(), "{lost:?}: add them to this test");
         assert_eq!(own("synth", "dependencies"), ["pointcloud"]);
+    }
+
+    #[test]
+    fn rule_1_only_the_orchestrator_knows_experiments() {
+        let mut faults = Vec::new();
+        for name in crates().into_iter().filter(|name| name != "xtask") {
+            for section in ["dependencies", "dev-dependencies"] {
+                if own(&name, section).iter().any(|other| other == "experiment") {
+                    faults.push(format!("{name} depends on experiment ({section})"));
+                }
+            }
+        }
+        // Experiments compute; pictures and files are made by others.
+        for other in own("experiment", "dependencies") {
+            if ["ingest", "export", "report"].contains(&other.as_str()) {
+                faults.push(format!("experiment depends on {other}"));
+            }
+        }
+        report(&faults);
     }
 
     #[test]
@@ -318,7 +337,7 @@ mod architecture {
                 &["rusqlite", "postgres", "tiff", "parquet", "flatgeobuf", "geotiff-writer"],
                 &["export"],
             ),
-            (&["image", "plotters", "plotly", "ab_glyph"], &["report"]),
+            (&["image", "plotters", "plotters-backend", "plotly", "ab_glyph"], &["report"]),
             (&["bincode", "mcap", "foxglove"], &["artefact"]),
             (&["faer", "spade"], &["ground"]),
             (&["clarabel"], &["crowns"]),

@@ -23,4 +23,7 @@ pub enum Error {
     /// An artefact could not be read or an output not be published.
     #[error(transparent)]
     Artefact(#[from] timberline_artefact::Error),
+    /// A chart that could not be laid out.
+    #[error("the chart cannot be drawn: {0}")]
+    Chart(String),
 }

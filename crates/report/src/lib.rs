@@ -5,9 +5,11 @@
 //!
 //! * [`map`]: the map of a site; [`stage`] makes one for every site of a campaign.
 //! * [`pictures`]: single artefacts, for looking into a store.
+//! * [`chart`]: curves in panels, as PNG and as SVG.
 //! * [`figure`]: title, frame, legend, scale bar and north arrow around either.
 
 pub mod canvas;
+pub mod chart;
 pub mod colour;
 pub mod error;
 pub mod figure;
@@ -20,5 +22,6 @@ pub mod text;
 pub mod ticks;
 
 pub use canvas::Canvas;
+pub use chart::Chart;
 pub use error::Error;
 pub use grid::Grid;

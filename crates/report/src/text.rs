@@ -91,6 +91,32 @@ impl Fonts {
             Align::Centre => x - self.width(text, style) / 2.0,
             Align::Right => x - self.width(text, style),
         };
+        self.rasterise(text, [x, y], style, |x, y, cover| {
+            canvas.blend(x, y, style.paint, cover);
+        });
+    }
+
+    /// Writes a text that reads upwards, its base line going up from a position.
+    pub fn write_upwards(&self, canvas: &mut Canvas, text: &str, [x, y]: [f64; 2], style: &Style) {
+        let start = match style.align {
+            Align::Left => 0.0,
+            Align::Centre => -self.width(text, style) / 2.0,
+            Align::Right => -self.width(text, style),
+        };
+        let (x, y) = (x.round() as i64, y.round() as i64);
+        self.rasterise(text, [start, 0.0], style, |along, below, cover| {
+            canvas.blend(x + below, y - along, style.paint, cover);
+        });
+    }
+
+    /// Calls `visit` with every pixel of a text on a horizontal base line and how much it covers.
+    fn rasterise(
+        &self,
+        text: &str,
+        [x, y]: [f64; 2],
+        style: &Style,
+        mut visit: impl FnMut(i64, i64, f64),
+    ) {
         let scale = PxScale::from(style.size as f32);
         let face = self.face(style).as_scaled(scale);
         let (mut place, mut last) = (x as f32, None);
@@ -103,7 +129,7 @@ impl Fonts {
                 outline.draw(|column, row, cover| {
                     let x = i64::from(column) + corner.x as i64;
                     let y = i64::from(row) + corner.y as i64;
-                    canvas.blend(x, y, style.paint, f64::from(cover));
+                    visit(x, y, f64::from(cover));
                 });
             }
             place += face.h_advance(glyph);
@@ -152,6 +178,19 @@ mod tests {
         let dark = |x: i64| (0..40).any(|y| canvas.pixel(x, y).unwrap()[0] < 100);
         assert!(dark(188) || dark(187) || dark(186));
         assert!((0..60).all(|x| !dark(x)) && (191..200).all(|x| !dark(x)));
+    }
+
+    #[test]
+    fn turned_text_is_the_same_text() {
+        let fonts = Fonts::load().unwrap();
+        let style = Style::new(20.0, Paint::solid([0; 3]));
+        let mut flat = Canvas::new(60, 60, [255; 3]);
+        fonts.write(&mut flat, "Fg", [10.0, 40.0], &style);
+        let mut turned = Canvas::new(60, 60, [255; 3]);
+        fonts.write_upwards(&mut turned, "Fg", [40.0, 49.0], &style);
+        for (x, y) in (0..60).flat_map(|x| (0..60).map(move |y| (x, y))) {
+            assert_eq!(flat.pixel(x, y), turned.pixel(y, 59 - x), "{x} {y}");
+        }
     }
 
     #[test]

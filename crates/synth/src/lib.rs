@@ -28,6 +28,7 @@ pub mod error;
 pub mod forest;
 pub mod plots;
 pub mod pulse;
+pub mod random;
 pub mod sample;
 pub mod scanner;
 pub mod scene;
@@ -41,7 +42,6 @@ mod canopy;
 mod exposure;
 mod foliage;
 mod noise;
-mod random;
 
 pub use crown::{Crown, Profile};
 pub use error::Error;

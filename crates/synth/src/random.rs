@@ -8,7 +8,7 @@ use rand_chacha::ChaCha8Rng;
 
 /// What a stream is for; part of its key, so that no two uses share numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Domain {
+pub enum Domain {
     /// Attributes and place of a tree.
     Tree = 1,
     /// Lean and asymmetry of a grown tree.
@@ -21,17 +21,20 @@ pub(crate) enum Domain {
     Plot = 5,
     /// Lattice noise of terrain and undergrowth.
     Noise = 6,
+    /// What experiments do to trees and points of a scene.
+    Experiment = 7,
 }
 
 /// One stream of numbers.
 #[derive(Debug, Clone)]
-pub(crate) struct Stream {
+pub struct Stream {
     rng: ChaCha8Rng,
 }
 
 impl Stream {
     /// The stream of a seed, a use and an index.
-    pub(crate) fn new(seed: u64, domain: Domain, index: u64) -> Self {
+    #[must_use]
+    pub fn new(seed: u64, domain: Domain, index: u64) -> Self {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&(domain as u64).to_le_bytes());
@@ -41,27 +44,27 @@ impl Stream {
     }
 
     /// 64 random bits.
-    pub(crate) fn bits(&mut self) -> u64 {
+    pub fn bits(&mut self) -> u64 {
         self.rng.next_u64()
     }
 
     /// Uniform in [0, 1), in steps of 2^-32: enough for positions within a footprint or a crown.
-    pub(crate) fn unit(&mut self) -> f64 {
+    pub fn unit(&mut self) -> f64 {
         f64::from(self.rng.next_u32()) * (1.0 / 4_294_967_296.0)
     }
 
     /// Uniform in [low, high).
-    pub(crate) fn within(&mut self, low: f64, high: f64) -> f64 {
+    pub fn within(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.unit()
     }
 
     /// True with a probability.
-    pub(crate) fn chance(&mut self, probability: f64) -> bool {
+    pub fn chance(&mut self, probability: f64) -> bool {
         self.unit() < probability
     }
 
     /// Exponential with mean 1.
-    pub(crate) fn exponential(&mut self) -> f64 {
+    pub fn exponential(&mut self) -> f64 {
         // The half step keeps the logarithm finite.
         -libm::log((f64::from(self.rng.next_u32()) + 0.5) * (1.0 / 4_294_967_296.0))
     }
@@ -80,7 +83,7 @@ impl Stream {
     }
 
     /// Standard normal (Box and Muller 1958).
-    pub(crate) fn normal(&mut self) -> f64 {
+    pub fn normal(&mut self) -> f64 {
         let radius = (2.0 * self.exponential()).sqrt();
         radius * libm::cos(std::f64::consts::TAU * self.unit())
     }
@@ -95,18 +98,18 @@ impl Stream {
     }
 
     /// Weibull by inversion.
-    pub(crate) fn weibull(&mut self, shape: f64, scale: f64) -> f64 {
+    pub fn weibull(&mut self, shape: f64, scale: f64) -> f64 {
         scale * libm::pow(self.exponential(), 1.0 / shape)
     }
 
     /// A factor around 1: the exponential of a normal number with the given deviation, which is
     /// cut at two deviations.
-    pub(crate) fn factor(&mut self, deviation: f64) -> f64 {
+    pub fn factor(&mut self, deviation: f64) -> f64 {
         libm::exp(deviation * self.normal().clamp(-2.0, 2.0))
     }
 
     /// A direction in the plane.
-    pub(crate) fn direction(&mut self) -> [f64; 2] {
+    pub fn direction(&mut self) -> [f64; 2] {
         let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.unit());
         [cos, sin]
     }

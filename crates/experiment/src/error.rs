@@ -1,0 +1,48 @@
+//! What can go wrong.
+
+/// Why an experiment could not be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parameter outside its range.
+    #[error("`{name}` is {value}; expected {expected}")]
+    Parameter {
+        /// Name of the parameter, with its unit.
+        name: &'static str,
+        /// The value given.
+        value: f64,
+        /// The range in words.
+        expected: &'static str,
+    },
+    /// A dataset whose stands hold too few trees that can be seen.
+    #[error(
+        "dataset {dataset}: {found} of {wanted} trees in {plots} plots; its stands are too thin"
+    )]
+    TooFewTrees {
+        /// Name of the dataset.
+        dataset: String,
+        /// Trees wanted.
+        wanted: usize,
+        /// Trees found.
+        found: usize,
+        /// Plots grown.
+        plots: u64,
+    },
+    /// A cluster that no method can be run on.
+    #[error("cluster {id}: {reason}")]
+    Cluster {
+        /// Number of the cluster.
+        id: u64,
+        /// What is wrong with it.
+        reason: &'static str,
+    },
+    /// A virtual forest could not be grown.
+    #[error(transparent)]
+    Synth(#[from] timberline_synth::Error),
+    /// A fit failed.
+    #[error(transparent)]
+    Crowns(#[from] timberline_crowns::Error),
+    /// The neighbour search could not be built.
+    #[error(transparent)]
+    Search(#[from] timberline_pointcloud::nearest::BuildError),
+}

@@ -1,0 +1,13 @@
+//! The papers' experiments, repeated on data whose truth is known.
+//!
+//! * [`crowns`]: how far from the stem each method of fitting a crown puts a tree (Polewski et al.,
+//!   L1-norm fitting of elliptic paraboloids with prior information for enhanced coniferous tree
+//!   localization in ALS point clouds, section 6): datasets, sweeps over the parameters, tables.
+//!
+//! Nothing here touches a file or draws: results are structures, tables are text. The same
+//! parameters give the same bytes whatever the number of threads.
+
+pub mod crowns;
+mod error;
+
+pub use error::Error;
