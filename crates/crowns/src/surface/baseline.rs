@@ -1,8 +1,8 @@
 //! What takes no surface: the highest cell, the middle of the outline; and the consensus models.
 
+use super::Problem;
 use super::method::{Certificate, Fit, Flag, Method, Surface, unfitted};
 use super::problem::{Cell, highest};
-use super::Problem;
 use crate::{CrownModelParams, Error, Window, footprint, starsac};
 
 /// The highest cell.

@@ -1,6 +1,7 @@
 //! The reference engine: Clarabel, in the form with the fewest unknowns.
 
-use super::program::{Cone, Dual, Optimum, Program};
+use super::dual::Dual;
+use super::program::{Cone, Optimum, Program};
 use crate::Error;
 use clarabel::algebra::CscMatrix;
 use clarabel::solver::SupportedConeT::{NonnegativeConeT, SecondOrderConeT};

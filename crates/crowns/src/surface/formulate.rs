@@ -53,13 +53,8 @@ fn equal_bounds<const K: usize>(limits: &Limits, phi0: [f64; K]) -> Vec<Cone<K>>
 /// Unknowns phi0 to phi5.
 pub(super) fn elliptic(cells: &[Cell], limits: &Limits) -> Program<6> {
     let row = |&[x, y, z, w]: &Cell| Row { d: [x * x, y * y, x * y, x, y, 1.0], z, w };
-    let form = ShapeForm {
-        phi0: unit(0),
-        phi1: unit(1),
-        phi2: unit(2),
-        share: [0.0; 6],
-        whole: 1.0,
-    };
+    let form =
+        ShapeForm { phi0: unit(0), phi1: unit(1), phi2: unit(2), share: [0.0; 6], whole: 1.0 };
     Program::new(cells.iter().map(row).collect(), form.cones(limits))
 }
 
@@ -69,13 +64,8 @@ pub(super) fn elliptic_fixed(cells: &[Cell], limits: &Limits, centre: [f64; 2]) 
         let (dx, dy) = (x - centre[0], y - centre[1]);
         Row { d: [dx * dx, dy * dy, dx * dy, 1.0], z, w }
     };
-    let form = ShapeForm {
-        phi0: unit(0),
-        phi1: unit(1),
-        phi2: unit(2),
-        share: [0.0; 4],
-        whole: 1.0,
-    };
+    let form =
+        ShapeForm { phi0: unit(0), phi1: unit(1), phi2: unit(2), share: [0.0; 4], whole: 1.0 };
     Program::new(cells.iter().map(row).collect(), form.cones(limits))
 }
 

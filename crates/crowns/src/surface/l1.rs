@@ -41,11 +41,7 @@ pub(super) struct Found {
 }
 
 impl Found {
-    pub(super) fn of<const K: usize>(
-        scaled: &Scaled,
-        optimum: &Optimum<K>,
-        surface: Apex,
-    ) -> Self {
+    pub(super) fn of<const K: usize>(scaled: &Scaled, optimum: &Optimum<K>, surface: Apex) -> Self {
         let surface = Apex { curvature: scaled.limits.project(surface.curvature), ..surface };
         Self {
             surface,
@@ -124,11 +120,7 @@ impl L1 {
         }
     }
 
-    fn solve_equal(
-        &self,
-        scaled: &Scaled,
-        corners: Option<[[f64; 2]; 2]>,
-    ) -> Result<Found, Error> {
+    fn solve_equal(&self, scaled: &Scaled, corners: Option<[[f64; 2]; 2]>) -> Result<Found, Error> {
         let program = formulate::equal(&scaled.cells, &scaled.limits, corners);
         let optimum = self.engine.solve(&program)?;
         let mut surface = formulate::equal_apex(optimum.x);

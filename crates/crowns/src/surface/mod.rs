@@ -29,6 +29,7 @@ mod baseline;
 mod bounds;
 mod clarabel;
 mod dense;
+mod dual;
 mod engine;
 mod formulate;
 mod interior;

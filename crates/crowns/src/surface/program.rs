@@ -55,7 +55,7 @@ pub(super) struct Program<const K: usize> {
     pub(super) rows: Vec<Row<K>>,
     pub(super) cones: Vec<Cone<K>>,
     /// Largest size of each unknown that a sum of absolute residuals plus heights of 1 allows: what
-    /// turns a residue of the dual equations into a part of the bound. See [`Dual::bound`].
+    /// turns a residue of the dual equations into a part of the bound. See [`super::dual::Dual::bound`].
     pub(super) spread: [f64; K],
     /// Size that no unknown can exceed in any case.
     pub(super) cap: [f64; K],
@@ -91,45 +91,4 @@ impl<const K: usize> Program<K> {
     pub(super) fn is_linear(&self) -> bool {
         self.cones.iter().all(|cone| cone.dim == 1)
     }
-}
-
-/// Multipliers: `y` of the residuals, `s` of the cones.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Dual {
-    pub(super) y: Vec<f64>,
-    pub(super) s: Vec<[f64; 4]>,
-}
-
-impl Dual {
-    /// A bound that no feasible surface beats, whatever the multipliers are.
-    ///
-    /// With `|y| <= w` and `s` in the (self-dual) cones every feasible `x` has
-    /// `sum w |d x - z| >= y (D x - z) - s (G x + h) = -z y - h s + rho x`, `rho = D'y - G's`. Where `rho`
-    /// is not exactly zero, `rho x` is bounded by the size that `x` can have while its objective is not
-    /// above `level`. `y` and `s` are brought into their sets first.
-    pub(super) fn bound<const K: usize>(&self, program: &Program<K>, level: f64) -> f64 {
-        let (mut value, mut rho) = (0.0, [0.0; K]);
-        for (row, &y) in program.rows.iter().zip(&self.y) {
-            let y = y.clamp(-row.w, row.w);
-            value -= row.z * y;
-            rho.iter_mut().zip(&row.d).for_each(|(sum, d)| *sum += d * y);
-        }
-        for (cone, s) in program.cones.iter().zip(&self.s) {
-            let s = into_cone(*s, cone.dim);
-            value -= (0..cone.dim).map(|i| cone.shift[i] * s[i]).sum::<f64>();
-            let moved = cone.transposed(&s);
-            rho.iter_mut().zip(moved).for_each(|(sum, part)| *sum -= part);
-        }
-        let reach = level + program.magnitude();
-        let largest = |k: usize| (program.spread[k] * reach).min(program.cap[k]);
-        let open = (0..K).filter(|&k| rho[k] != 0.0).map(|k| rho[k].abs() * largest(k));
-        value - open.sum::<f64>()
-    }
-}
-
-/// The vector with its tail shortened or its head raised until it lies in the cone.
-fn into_cone(mut s: [f64; 4], dim: usize) -> [f64; 4] {
-    let tail = (1..dim).map(|i| s[i] * s[i]).sum::<f64>().sqrt();
-    s[0] = s[0].max(tail).max(0.0);
-    s
 }

@@ -1,6 +1,5 @@
 //! How many unknowns the cells determine.
 
-
 use super::problem::Cell;
 use super::scale::Scale;
 
@@ -34,7 +33,8 @@ pub(super) fn determines<const K: usize>(cells: &[Cell], row: fn(f64, f64) -> [f
     for rank in 0..K {
         let mut gram = [0.0; K];
         rows.iter().for_each(|row| (0..K).for_each(|k| gram[k] += row[k] * row[k]));
-        let longest = |best: usize, k: usize| if free[k] && gram[k] > gram[best] { k } else { best };
+        let longest =
+            |best: usize, k: usize| if free[k] && gram[k] > gram[best] { k } else { best };
         let start = free.iter().position(|free| *free).unwrap_or(0);
         let pivot = (0..K).fold(start, longest);
         let norm = gram[pivot].sqrt();
@@ -88,6 +88,5 @@ mod tests {
         assert!(determines(&ellipse, equal_row) && !determines(&ellipse, elliptic_row));
         let grid: Vec<Cell> = (0..12).map(|i| at(f64::from(i % 4), f64::from(i / 4))).collect();
         assert!(determines(&grid, elliptic_row));
-
     }
 }
