@@ -24,6 +24,7 @@ impl Engine {
         {
             return Ok(optimum);
         }
-        interior::solve(program)
+        // Rounding can stop a solver of few unknowns where a general one still gets through.
+        interior::solve(program).or_else(|_| clarabel::solve(program))
     }
 }

@@ -40,6 +40,8 @@ mod paraboloid;
 mod problem;
 mod program;
 mod rank;
+#[cfg(test)]
+mod samples;
 mod scale;
 mod search;
 mod thinning;

@@ -103,6 +103,27 @@ impl Scaled {
         self.cells.iter().map(|&[x, y, z, w]| w * (surface.z(x, y) - z).abs()).sum()
     }
 
+    /// The height of the apex at which a surface of this shape and centre fits best: the weighted
+    /// median of what is left of the heights (the middle of all medians).
+    pub(super) fn best_top(&self, surface: &Apex) -> f64 {
+        let surface = Apex { top: 0.0, ..*surface };
+        let rest = self.cells.iter().map(|&[x, y, z, w]| (z - surface.z(x, y), w));
+        let mut rest: Vec<(f64, f64)> = rest.collect();
+        rest.sort_unstable_by(|a, b| a.0.total_cmp(&b.0));
+        let half = 0.5 * rest.iter().map(|(_, w)| w).sum::<f64>();
+        let mut below = 0.0;
+        for (index, (value, weight)) in rest.iter().enumerate() {
+            below += weight;
+            if below > half {
+                return *value;
+            }
+            if below == half {
+                return rest.get(index + 1).map_or(*value, |next| 0.5 * (value + next.0));
+            }
+        }
+        0.0
+    }
+
     /// Back to metres in the problem's frame: curvatures in 1/m, centre and top.
     pub(super) fn in_metres(&self, surface: &Apex) -> Apex {
         let Scale { centre, length_m: l, height_m: h } = self.scale;
