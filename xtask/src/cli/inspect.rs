@@ -8,8 +8,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{
-    CrownModels, GroundModel, GroundPoints, Heights, Labels, Outputs, PointTile, Shards, Trees,
-    Treetops,
+    self, CrownModels, GroundModel, GroundPoints, Heights, Labels, Outputs, PointTile, Shards,
+    Trees, Treetops,
 };
 use timberline_artefact::{Header, InputRef, Kind, Opened};
 
@@ -72,7 +72,7 @@ fn print_header(path: &Path, header: &Header) {
     let size = std::fs::metadata(path).map_or(0, |meta| meta.len());
     out::line(&path.display().to_string());
     let field = |name: &str, value: String| out::line(&format!("  {name:<14} {value}"));
-    field("kind", format!("{} (version {}), {}", header.kind, header.kind_version, bytes(size)));
+    field("kind", format!("{} ({}), {}", header.kind, version(header), bytes(size)));
     field("unit", header.unit.to_string());
     field("key", header.key.clone());
     field(
@@ -109,6 +109,15 @@ fn print_header(path: &Path, header: &Header) {
     }
     if header.warnings.len() > WARNINGS_SHOWN {
         field("warning", format!("... {} in all", header.warnings.len()));
+    }
+}
+
+/// The version of the kind, and as what an older one is shown.
+fn version(header: &Header) -> String {
+    let own = header.kind_version;
+    match kinds::info(&header.kind).map(|info| info.version) {
+        Some(now) if now != own => format!("version {own}, shown as version {now}"),
+        _ => format!("version {own}"),
     }
 }
 

@@ -2,6 +2,7 @@
 
 use crate::support::{PIPELINE, Stand, row_text, tile};
 use std::collections::BTreeMap;
+use std::path::Path;
 
 fn counts(pairs: &[(&str, u64)]) -> BTreeMap<String, u64> {
     pairs.iter().map(|(stage, count)| ((*stage).to_owned(), *count)).collect()
@@ -280,17 +281,21 @@ fn no_two_units_share_a_key() {
     }
 }
 
+/// What `inspect` prints about a file; it takes no campaign.
+fn inspected(stand: &Stand, path: &Path) -> String {
+    let args = ["inspect", path.to_str().unwrap()];
+    let mut command = stand.command(&args, &[]);
+    command.env("XTASK_TEST_ARGS", serde_json::to_string(&args).unwrap());
+    crate::support::ended(command.spawn().unwrap()).stdout
+}
+
 #[test]
 fn inspect_shows_what_is_inside() {
     let stand = ran_once();
     let path = stand.artefact("sum", &format!("{}-", tile(2, 1)));
     let shown = stand.xtask(&["status"], &[]).stdout;
     assert!(shown.contains("sum") && shown.contains("ended with exit code 0"), "{shown}");
-    let mut command = stand.command(&["inspect", path.to_str().unwrap()], &[]);
-    // `inspect` takes no campaign.
-    let args = serde_json::to_string(&["inspect", path.to_str().unwrap()]).unwrap();
-    command.env("XTASK_TEST_ARGS", args);
-    let shown = crate::support::ended(command.spawn().unwrap()).stdout;
+    let shown = inspected(&stand, &path);
     for part in [
         "kind           heights",
         "tile:2_1",
@@ -300,6 +305,22 @@ fn inspect_shows_what_is_inside() {
         "height_m",
         "12.5000",
     ] {
+        assert!(shown.contains(part), "{part} in\n{shown}");
+    }
+}
+
+#[test]
+fn inspect_shows_an_older_version_as_the_present_one() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/artefact/golden");
+    let stand = ran_once();
+    let shown = inspected(&stand, &golden.join("trees-v1.tmbr"));
+    for part in ["kind           trees (version 1, shown as version 2)", "position_method=\"L1\""] {
+        assert!(shown.contains(part), "{part} in\n{shown}");
+    }
+    let shown = inspected(&stand, &golden.join("trees-v2.tmbr"));
+    for part in
+        ["kind           trees (version 2)", "rotation_deg=22.5", "fit_nodes", "semi_axes_m"]
+    {
         assert!(shown.contains(part), "{part} in\n{shown}");
     }
 }
