@@ -5,6 +5,7 @@
 //! With p - q = D x - z, p, q >= 0, slacks kappa = G x + h of the cones and multipliers y, s it seeks
 //! D'y = G's, p (w - y) = q (w + y) = mu and kappa o s = mu e for mu towards 0.
 
+mod polish;
 mod scaling;
 mod step;
 
@@ -80,6 +81,8 @@ pub(super) fn solve<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, 
             break;
         }
     }
+    state.measure();
+    polish::polish(&mut state);
     state.finish(iterations)
 }
 
