@@ -123,24 +123,26 @@ fn assert_same_trees(a: &BTreeMap<u64, Tree>, b: &BTreeMap<u64, Tree>, what: &st
     assert_eq!((only(a, b), only(b, a)), (vec![], vec![]), "{what}: trees in one only");
     for (left, right) in a.values().zip(b.values()) {
         let numbers = |tree: &Tree| {
-            let [x, y, z] = tree.apex_m;
-            let [px, py] = tree.position_m;
-            [
-                x,
-                y,
-                z,
-                px,
-                py,
+            let planar = [tree.position_m, tree.surface_centre_m, tree.semi_axes_m];
+            let single = [
                 tree.height_m,
                 tree.ground_m,
                 tree.crown_radius_m,
                 tree.crown_area_m2,
                 tree.crown_base_m,
-            ]
+                tree.position_extent_m,
+                tree.position_standard_error_m,
+                tree.surface_apex_m,
+                tree.rotation_deg,
+                tree.fit_objective_m,
+                tree.fit_gap,
+            ];
+            [&tree.apex_m[..], planar.as_flattened(), &single].concat()
         };
         let same = numbers(left).iter().zip(numbers(right)).all(|(a, b)| near(*a, b));
         let counts = |tree: &Tree| {
-            (tree.points, tree.inliers, tree.outliers, tree.flags, tree.crown_m.len())
+            let of_model = (tree.points, tree.inliers, tree.outliers, tree.crown_m.len());
+            (of_model, tree.position_method, tree.fit_cells, tree.fit_nodes, tree.flags)
         };
         assert!(same && counts(left) == counts(right), "{what}:\n{left:#?}\n{right:#?}");
     }
