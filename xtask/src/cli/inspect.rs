@@ -241,6 +241,7 @@ fn print_table(name: &str, rows: &Rows, shown: usize) {
 
 fn number(value: &Value) -> String {
     match value.as_f64() {
+        Some(number) if number != 0.0 && number.abs() < 1e-3 => format!("{number:.1e}"),
         Some(number) if number.fract() != 0.0 => format!("{number:.4}"),
         _ => value.to_string(),
     }
