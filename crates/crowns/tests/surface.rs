@@ -6,17 +6,35 @@ use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use timberline_crowns::Error;
 use timberline_crowns::surface::{
-    AxisBounds, EqualAxis, Fit, Flag, Paraboloid, Prior, Problem, Shape, fit, thin,
+    AxisBounds, Engine, Fit, Flag, L1, Method, Paraboloid, Prior, Problem, Shape, Surface, thin,
 };
 
-const AXES: AxisBounds = AxisBounds { largest_m: 3.0, smallest_m: 0.1 };
+const ENGINES: [Engine; 2] = [Engine::Dedicated, Engine::Clarabel];
 
 fn uniform(random: &mut ChaCha8Rng) -> f64 {
     (random.next_u64() >> 11) as f64 / (1u64 << 53) as f64
 }
 
 fn solve(cells: &[[f64; 3]], prior: Option<Prior>) -> Fit {
-    fit(&Problem { cells, axes: AXES, prior }, &EqualAxis).unwrap()
+    solve_with(&L1::equal_axes(), cells, prior)
+}
+
+fn solve_with(method: &L1, cells: &[[f64; 3]], prior: Option<Prior>) -> Fit {
+    method.fit(&Problem { cells, weights: None, prior }).unwrap()
+}
+
+/// Equal axes and unequal ones.
+fn methods() -> Vec<L1> {
+    let method = |omega: f64| ENGINES.map(|engine| L1 { omega, engine, ..L1::default() });
+    [0.0, 0.3, 1.0].into_iter().flat_map(method).collect()
+}
+
+fn paraboloid(fit: &Fit) -> Paraboloid {
+    *fit.surface.as_ref().and_then(Surface::paraboloid).unwrap()
+}
+
+fn shape(fit: &Fit) -> Shape {
+    paraboloid(fit).shape().unwrap()
 }
 
 fn surface(centre: [f64; 2], apex_z_m: f64, axis: f64) -> Paraboloid {
@@ -45,7 +63,7 @@ fn objective(of: &Paraboloid, cells: &[[f64; 3]]) -> f64 {
 fn an_exact_surface_is_recovered() {
     let truth = surface([0.3, -0.4], 21.5, 0.9);
     let found = solve(&crown(&truth, 2.5, || 0.0), None);
-    let shape = found.solution.unwrap().paraboloid.shape().unwrap();
+    let shape = shape(&found);
     assert!((found.position[0] - 0.3).abs() < 1e-6 && (found.position[1] + 0.4).abs() < 1e-6);
     assert!((shape.apex_z_m - 21.5).abs() < 1e-6 && (shape.semiaxes_m[0] - 0.9).abs() < 1e-6);
     assert_eq!(found.flags, []);
@@ -76,11 +94,12 @@ fn the_objective_is_that_of_the_best_vertex() {
                 [x, y, truth.z(x, y) + uniform(&mut random) - 0.5]
             })
             .collect();
-        let solution = solve(&cells, None).solution.unwrap();
-        let best = best_vertex(&cells);
-        assert!((solution.objective_m - best).abs() < 1e-6 * best, "{solution:?} {best}");
-        assert!((objective(&solution.paraboloid, &cells) - solution.objective_m).abs() < 1e-9);
-        assert!(solution.gap_m <= 1e-6);
+        let found = solve(&cells, None);
+        let certificate = found.certificate.unwrap();
+        let (told, best) = (certificate.objective_m, best_vertex(&cells));
+        assert!((told - best).abs() < 1e-9 * best, "{certificate:?} {best}");
+        assert!((objective(&paraboloid(&found), &cells) - told).abs() < 1e-9);
+        assert!(certificate.relative_gap() <= 1e-9);
     }
 }
 
@@ -127,14 +146,18 @@ fn through(points: [[f64; 3]; 4]) -> Option<[f64; 4]> {
 fn a_prior_box_holds_the_centre() {
     let truth = surface([1.2, 0.0], 15.0, 0.8);
     let cells = crown(&truth, 2.0, || 0.0);
-    for half_width_m in [0.5, 0.1, 0.0] {
-        let found = solve(&cells, Some(Prior { centre: [0.0, 0.0], half_width_m }));
-        assert!((found.position[0] - half_width_m).abs() < 1e-5, "{half_width_m}: {found:?}");
-        assert!(found.position[1].abs() <= half_width_m + 1e-5);
-        assert!(found.flags.contains(&Flag::PriorActive));
+    for method in methods() {
+        for half_width_m in [0.5, 0.1, 0.0] {
+            let prior = Prior { centre: [0.0, 0.0], half_width_m };
+            let found = solve_with(&method, &cells, Some(prior));
+            assert!((found.position[0] - half_width_m).abs() < 1e-5, "{method:?}: {found:?}");
+            assert!(found.position[1].abs() <= half_width_m + 1e-5);
+            assert!(found.flags.contains(&Flag::PriorActive));
+        }
+        let prior = Prior { centre: [1.0, 0.0], half_width_m: 0.5 };
+        let free = solve_with(&method, &cells, Some(prior));
+        assert!((free.position[0] - 1.2).abs() < 1e-6 && !free.flags.contains(&Flag::PriorActive));
     }
-    let free = solve(&cells, Some(Prior { centre: [1.0, 0.0], half_width_m: 0.5 }));
-    assert!((free.position[0] - 1.2).abs() < 1e-6 && !free.flags.contains(&Flag::PriorActive));
 }
 
 #[test]
@@ -144,7 +167,7 @@ fn the_box_costs_nothing_but_what_it_must() {
     let truth = surface([0.9, 0.3], 15.0, 0.8);
     let cells = crown(&truth, 2.0, || 0.4 * uniform(&mut random));
     let prior = Prior { centre: [0.0, 0.0], half_width_m: 0.4 };
-    let best = solve(&cells, Some(prior)).solution.unwrap();
+    let best = solve(&cells, Some(prior)).certificate.unwrap();
     let mut random = ChaCha8Rng::seed_from_u64(80);
     for _ in 0..2000 {
         let [x, y, axis] = [(); 3].map(|()| uniform(&mut random));
@@ -163,7 +186,7 @@ fn an_ambiguous_optimum_is_settled_by_least_squares() {
         cells.extend([[x, y, 9.0], [x, y, 8.0]]);
     }
     cells.extend([[0.0, 0.0, 10.0], [0.0, 0.0, 10.6]]);
-    let shape = solve(&cells, None).solution.unwrap().paraboloid.shape().unwrap();
+    let shape = shape(&solve(&cells, None));
     assert!((shape.apex_z_m - 10.3).abs() < 1e-3, "{shape:?}");
     let at_one = shape.apex_z_m - 1.0 / (shape.semiaxes_m[0] * shape.semiaxes_m[0]);
     assert!((at_one - 8.5).abs() < 1e-3, "{shape:?}");
@@ -183,7 +206,7 @@ fn a_shifted_frame_gives_the_same_bits() {
     let fit_in = |points: Vec<[f64; 3]>| {
         let cells = thin(points, apex, 0.4).unwrap();
         let found = solve(&cells, Some(Prior { centre: [0.0; 2], half_width_m: 0.5 }));
-        (found.position.map(f64::to_bits), found.solution.unwrap().objective_m.to_bits())
+        (found.position.map(f64::to_bits), found.certificate.unwrap().objective_m.to_bits())
     };
     let mut moved = Vec::new();
     for origin in [[557_000, 4_112_000, 0], [557_808, 4_112_256, 800], [-12, 99, 7]] {
@@ -198,9 +221,12 @@ fn a_shifted_frame_gives_the_same_bits() {
 
 #[test]
 fn fewer_than_four_cells() {
-    let found = solve(&[[0.0, 0.0, 5.0], [1.0, 0.0, 7.0], [0.0, 1.0, 6.0]], None);
-    assert_eq!(found.flags, [Flag::Underdetermined]);
-    assert_eq!((found.position, found.solution), ([1.0, 0.0], None));
+    for method in methods() {
+        let found = solve_with(&method, &[[0.0, 0.0, 5.0], [1.0, 0.0, 7.0], [0.0, 1.0, 6.0]], None);
+        assert_eq!(found.flags, [Flag::Underdetermined]);
+        assert_eq!((found.position, found.surface), ([1.0, 0.0], None));
+        assert_eq!(found.certificate, None);
+    }
 }
 
 #[test]
@@ -208,8 +234,10 @@ fn cells_on_a_line() {
     let cells: Vec<[f64; 3]> = (0..20)
         .map(|i| [0.5 * f64::from(i), 0.2 * f64::from(i) + 0.1, 9.0 - f64::from(i % 5)])
         .collect();
-    let found = solve(&cells, None);
-    assert_eq!((found.flags, found.position), (vec![Flag::Underdetermined], [0.0, 0.1]));
+    for method in methods() {
+        let found = solve_with(&method, &cells, None);
+        assert_eq!((found.flags, found.position), (vec![Flag::Underdetermined], [0.0, 0.1]));
+    }
 }
 
 #[test]
@@ -220,7 +248,39 @@ fn cells_on_a_circle() {
             [2.0 * cos + 300.0, 2.0 * sin - 7.0, f64::from(i)]
         })
         .collect();
-    assert_eq!(solve(&cells, None).flags, [Flag::Underdetermined]);
+    for method in methods() {
+        assert_eq!(solve_with(&method, &cells, None).flags, [Flag::Underdetermined]);
+    }
+}
+
+#[test]
+fn cells_on_other_conics() {
+    let around = |i: u32| libm::sincos(f64::from(i) * 0.5);
+    let ellipse = (0..12).map(around).map(|(sin, cos)| [2.0 * cos + sin, sin, cos]).collect();
+    let parabola = (0..12).map(|i| f64::from(i) * 0.3).map(|x| [x, 0.5 * x * x, -x]).collect();
+    let hyperbola = (1..12).map(|i| f64::from(i) * 0.3).map(|x| [x, 1.0 / x, x]).collect();
+    let lines = (0..12).map(|i| [f64::from(i / 2) * 0.5, f64::from(i % 2), 3.0]).collect();
+    for cells in [ellipse, parabola, hyperbola, lines] {
+        let cells: Vec<[f64; 3]> = cells;
+        for method in methods() {
+            let found = solve_with(&method, &cells, None);
+            let underdetermined = found.flags == [Flag::Underdetermined];
+            assert_eq!(underdetermined, method.omega > 0.0, "{method:?} {found:?}");
+            assert_eq!(underdetermined, found.surface.is_none());
+        }
+    }
+}
+
+#[test]
+fn cells_without_weight_do_not_count() {
+    let mut cells = crown(&surface([0.3, -0.4], 21.5, 0.9), 2.0, || 0.0);
+    let weights: Vec<f64> = (0..cells.len()).map(|i| if i < 3 { 1.0 } else { 0.0 }).collect();
+    cells[5][2] = 99.0;
+    for method in methods() {
+        let found = method.fit(&Problem::new(&cells).with_weights(&weights)).unwrap();
+        assert_eq!(found.flags, [Flag::Underdetermined]);
+        assert!(cells[..3].iter().any(|cell| cell[..2] == found.position));
+    }
 }
 
 #[test]
@@ -228,9 +288,26 @@ fn exactly_four_cells() {
     let truth = surface([0.5, 0.5], 10.0, 0.9);
     let cells =
         [[0.0, 0.0], [1.5, 0.2], [0.4, 1.6], [0.7, 0.6]].map(|[x, y]| [x, y, truth.z(x, y)]);
-    let found = solve(&cells, None);
-    assert!(found.flags.contains(&Flag::NoRedundancy), "{found:?}");
-    assert!((found.position[0] - 0.5).abs() < 1e-5);
+    for engine in ENGINES {
+        let found = solve_with(&L1 { engine, ..L1::default() }, &cells, None);
+        assert!(found.flags.contains(&Flag::NoRedundancy), "{found:?}");
+        assert!((found.position[0] - 0.5).abs() < 1e-5);
+        let elliptic = solve_with(&L1 { omega: 0.3, engine, ..L1::default() }, &cells, None);
+        assert_eq!(elliptic.flags, [Flag::Underdetermined]);
+    }
+}
+
+#[test]
+fn exactly_six_cells() {
+    let truth = Shape { centre: [0.5, 0.5], apex_z_m: 9.0, semiaxes_m: [1.0, 0.8], azimuth: 1.0 };
+    let truth = Paraboloid::from_shape(&truth);
+    let positions = [[0.0, 0.0], [1.5, 0.2], [0.4, 1.6], [0.7, 0.6], [1.2, 1.3], [0.1, 0.9]];
+    let cells = positions.map(|[x, y]| [x, y, truth.z(x, y)]);
+    for method in methods().into_iter().filter(|method| method.omega > 0.0) {
+        let found = solve_with(&method, &cells, None);
+        assert!(found.flags.contains(&Flag::NoRedundancy), "{found:?}");
+        assert!((found.position[0] - 0.5).abs() < 1e-4, "{found:?}");
+    }
 }
 
 #[test]
@@ -238,9 +315,11 @@ fn flat_bowl_and_needle() {
     for height in [|_: f64| 12.0, |r2: f64| 12.0 + 0.3 * r2, |r2: f64| 12.0 - 400.0 * r2] {
         let mut cells = crown(&surface([0.0; 2], 12.0, 1.0), 2.0, || 0.0);
         cells.iter_mut().for_each(|c| c[2] = height(c[0] * c[0] + c[1] * c[1]));
-        let found = solve(&cells, None);
-        assert!(found.flags.contains(&Flag::ShapeBoundActive), "{found:?}");
-        assert!(found.position.iter().all(|value| value.is_finite()));
+        for method in methods() {
+            let found = solve_with(&method, &cells, None);
+            assert!(found.flags.contains(&Flag::ShapeBoundActive), "{method:?} {found:?}");
+            assert!(found.position.iter().all(|value| value.is_finite()));
+        }
     }
 }
 
@@ -248,8 +327,10 @@ fn flat_bowl_and_needle() {
 fn a_tilted_plane() {
     let mut cells = crown(&surface([0.0; 2], 12.0, 1.0), 2.0, || 0.0);
     cells.iter_mut().for_each(|c| c[2] = 12.0 + 0.8 * c[0]);
-    let found = solve(&cells, None);
-    assert!(found.flags.contains(&Flag::CentreOutsideData), "{found:?}");
+    for method in methods() {
+        let found = solve_with(&method, &cells, None);
+        assert!(found.flags.contains(&Flag::CentreOutsideData), "{method:?} {found:?}");
+    }
 }
 
 #[test]
@@ -257,28 +338,81 @@ fn one_flank() {
     let truth = surface([0.0; 2], 12.0, 1.0);
     let mut cells = crown(&truth, 2.5, || 0.0);
     cells.retain(|c| c[0] > 0.0);
-    let found = solve(&cells, None);
-    assert!(found.flags.contains(&Flag::OneSided), "{found:?}");
-    assert!(found.position[0].abs() < 1e-5);
+    for method in methods() {
+        let found = solve_with(&method, &cells, None);
+        assert!(found.flags.contains(&Flag::OneSided), "{method:?} {found:?}");
+        assert!(found.position[0].abs() < 1e-5);
+    }
+}
+
+#[test]
+fn centre_on_the_box_and_imbalance_at_its_most() {
+    let truth = Shape { centre: [1.0, 0.2], apex_z_m: 12.0, semiaxes_m: [1.4, 0.7], azimuth: 0.5 };
+    let cells = crown(&Paraboloid::from_shape(&truth), 2.5, || 0.0);
+    let prior = Some(Prior { centre: [0.0; 2], half_width_m: 0.5 });
+    for engine in ENGINES {
+        let method = L1 { omega: 0.2, engine, ..L1::default() };
+        let found = solve_with(&method, &cells, prior);
+        assert_eq!(found.flags, [Flag::ImbalanceActive, Flag::PriorActive]);
+        let axes = shape(&found).semiaxes_m.map(|axis| 1.0 / (axis * axis));
+        assert!(((axes[1] - axes[0]) / (axes[1] + axes[0]) - 0.2).abs() < 1e-6, "{axes:?}");
+        let free = solve_with(&L1 { omega: 1.0, ..method }, &cells, None);
+        assert_eq!(free.flags, []);
+        assert!((shape(&free).azimuth - 0.5).abs() < 1e-5, "{free:?}");
+    }
 }
 
 #[test]
 fn what_means_nothing_is_an_error() {
     let cells = crown(&surface([0.0; 2], 12.0, 1.0), 2.0, || 0.0);
-    let with = |cells: &[[f64; 3]], axes, prior| {
-        fit(&Problem { cells, axes, prior }, &EqualAxis).unwrap_err()
-    };
-    let mut broken = cells.clone();
-    broken[7][2] = f64::NAN;
-    assert!(matches!(with(&broken, AXES, None), Error::NotFinite { index: 7, axis: 'z', .. }));
-    assert_eq!(with(&[], AXES, None), Error::NoCells);
-    for largest_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.05] {
-        let axes = AxisBounds { largest_m, smallest_m: 0.1 };
-        assert!(matches!(with(&cells, axes, None), Error::AxisBounds { .. }));
+    let with = |method: &L1, problem: Problem<'_>| method.fit(&problem).unwrap_err();
+    for method in methods() {
+        for (value, axis, place) in [(f64::NAN, 'z', 2), (f64::INFINITY, 'x', 0)] {
+            let mut broken = cells.clone();
+            broken[7][place] = value;
+            let error = with(&method, Problem::new(&broken));
+            assert!(matches!(error, Error::NotFinite { index: 7, axis: a, .. } if a == axis));
+        }
+        assert_eq!(with(&method, Problem::new(&[])), Error::NoCells);
+        for half_width_m in [-0.1, f64::NAN, f64::INFINITY] {
+            let problem = Problem::new(&cells).with_prior(Prior { centre: [0.0; 2], half_width_m });
+            assert!(matches!(with(&method, problem), Error::Prior { .. }));
+        }
+        let problem =
+            Problem::new(&cells).with_prior(Prior { centre: [f64::NAN, 0.0], half_width_m: 1.0 });
+        assert!(matches!(with(&method, problem), Error::Prior { .. }));
     }
-    for half_width_m in [-0.1, f64::NAN] {
-        let prior = Some(Prior { centre: [0.0; 2], half_width_m });
-        assert!(matches!(with(&cells, AXES, prior), Error::PriorWidth(_)));
+}
+
+#[test]
+fn bounds_that_mean_nothing_are_an_error() {
+    let cells = crown(&surface([0.0; 2], 12.0, 1.0), 2.0, || 0.0);
+    let with = |method: &L1| method.fit(&Problem::new(&cells)).unwrap_err();
+    for omega in [-0.1, 1.1, f64::NAN] {
+        assert!(matches!(with(&L1 { omega, ..L1::default() }), Error::Omega(_)));
+    }
+    for largest_m in [0.0, -1.0, f64::NAN, f64::INFINITY, 0.05] {
+        let bounds = AxisBounds::Exact { largest_m, smallest_m: 0.1 };
+        assert!(matches!(with(&L1 { bounds, ..L1::default() }), Error::AxisBounds { .. }));
+    }
+    for (largest_m, omega) in [(0.0, 0.0), (-1.0, 0.2), (f64::NAN, 0.2), (3.0, 1.0)] {
+        let method = L1 { omega, bounds: AxisBounds::Paper { largest_m }, ..L1::default() };
+        assert!(matches!(with(&method), Error::PaperBound { .. }), "{method:?}");
+    }
+}
+
+#[test]
+fn weights_that_mean_nothing_are_an_error() {
+    let cells = crown(&surface([0.0; 2], 12.0, 1.0), 2.0, || 0.0);
+    let with = |weights: &[f64]| {
+        L1::default().fit(&Problem::new(&cells).with_weights(weights)).unwrap_err()
+    };
+    let mut weights = vec![0.0; cells.len()];
+    assert_eq!(with(&weights), Error::NoCells);
+    assert!(matches!(with(&weights[1..]), Error::WeightCount { .. }));
+    for wrong in [-1.0, f64::NAN, f64::INFINITY] {
+        weights[3] = wrong;
+        assert!(matches!(with(&weights), Error::Weight { index: 3, .. }));
     }
 }
 
@@ -295,7 +429,7 @@ proptest! {
             let mut random = ChaCha8Rng::seed_from_u64(seed);
             move || 0.3 * uniform(&mut random) - 0.15
         }));
-        prop_assert!(found.solution.unwrap().objective_m <= best + 1e-6);
+        prop_assert!(found.certificate.unwrap().objective_m <= best + 1e-6);
     }
 }
 
@@ -308,10 +442,12 @@ fn the_standard_error_is_the_scatter_of_repeated_fits() {
         let mut random = ChaCha8Rng::seed_from_u64(u64::from(seed));
         // A sum of uniforms: nearly normal, standard deviation 0.3 m.
         let noise = || (0..12).map(|_| uniform(&mut random)).sum::<f64>() * 0.3 - 1.8;
-        let found = solve(&crown(&truth, 2.5, noise), None);
+        let cells = crown(&truth, 2.5, noise);
+        let found = solve(&cells, None);
+        let uncertainty = L1::default().uncertainty(&Problem::new(&cells), &found).unwrap();
         let (dx, dy) = (found.position[0] - 0.1, found.position[1] + 0.2);
         squares += dx * dx + dy * dy;
-        claimed += found.standard_error_m.unwrap();
+        claimed += uncertainty.unwrap().standard_error_m;
     }
     let scatter = (squares / f64::from(REPEATS)).sqrt();
     let ratio = claimed / f64::from(REPEATS) / scatter;

@@ -1,6 +1,10 @@
 //! Simulated crowns for tests and benchmarks: truth, echoes and how far a model is from the truth.
 #![allow(dead_code, reason = "every test binary uses a part")]
 
+pub(crate) mod feasible;
+pub(crate) mod oracle;
+pub(crate) mod problems;
+
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use timberline_crowns::Window;
