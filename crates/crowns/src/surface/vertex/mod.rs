@@ -21,6 +21,7 @@ mod descent;
 mod face;
 mod nearest;
 mod search;
+mod step;
 #[cfg(test)]
 mod tests;
 

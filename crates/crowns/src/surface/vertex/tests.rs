@@ -66,7 +66,7 @@ fn shape_of(seed: u64) -> Shape {
     Shape {
         step: [0.0, 0.01, 0.1, 1.0][seed as usize % 4],
         noise: [0.4, 0.0, 1.0][seed as usize % 3],
-        weighted: seed % 5 == 0,
+        weighted: seed.is_multiple_of(5),
         least: [0.05, 0.8, 4.0][seed as usize / 7 % 3],
         side: [None, Some(0.1), Some(0.01), Some(1.0)][seed as usize / 3 % 4],
     }
@@ -89,7 +89,7 @@ fn by_enumeration<const K: usize>(program: &Program<K>) -> f64 {
     let all: Vec<_> = rows.chain(program.cones.iter().map(|c| (c.rows[0], -c.shift[0]))).collect();
     let mut best = f64::INFINITY;
     combinations(all.len(), &mut |chosen: [usize; K]| {
-        let Some(inverse) = descent::invert(chosen.map(|item| all[item].0)) else { return };
+        let Some(inverse) = step::invert(chosen.map(|item| all[item].0)) else { return };
         let x: [f64; K] =
             std::array::from_fn(|i| (0..K).map(|k| inverse[i][k] * all[chosen[k]].1).sum());
         if program.cones.iter().all(|cone| cone.at(&x)[0] >= -1e-11) {
@@ -118,8 +118,8 @@ fn no_vertex_is_better() {
 #[test]
 fn every_crown_is_solved_with_a_tight_certificate() {
     let mut scratch = Scratch::default();
-    for seed in 0..10_000 {
-        let n = 20 + (seed as usize * 7919) % if seed % 50 == 0 { 980 } else { 150 };
+    for seed in 0..10_000u64 {
+        let n = 20 + (seed as usize * 7919) % if seed.is_multiple_of(50) { 980 } else { 150 };
         let program = crown(seed, n, &shape_of(seed));
         let optimum = solve_with(&program, &mut scratch).unwrap_or_else(|| panic!("{seed}"));
         let gap = optimum.objective - optimum.lower_bound;
