@@ -42,7 +42,9 @@ pub(super) struct Scratch {
     along: Vec<f64>,
     /// Sizes that count as nought: of the residuals, then of each bound.
     tiny: Vec<f64>,
-    points: Vec<search::Break>,
+    points: Vec<search::Break<f64>>,
+    /// Rows and bounds that a step meets, and those of them at its end.
+    met: Vec<usize>,
     tied: Vec<usize>,
 }
 

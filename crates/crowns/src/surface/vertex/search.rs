@@ -1,73 +1,71 @@
 //! The line search of the vertex descent: a weighted median by quickselect.
 
 /// Where an edge meets the zero of a residual or a bound.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) struct Break {
-    /// Distance along the edge.
-    pub(super) t: f64,
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub(super) struct Break<T> {
+    /// What says how far along the edge it is.
+    pub(super) key: T,
     /// By how much the slope of the objective rises there; infinite at a bound.
     pub(super) rise: f64,
-    /// The row or bound.
-    pub(super) at: usize,
 }
 
-/// The first place, in the given order, up to which the slope rises to nought or more.
+/// The first breakpoint, in the given order, up to which the slope rises to nought or more.
 ///
-/// Reorders the breakpoints so that those in front of the returned place come before it. The last
-/// one where rounding keeps the slope negative; `None` without breakpoints. The time is linear: the
-/// order need not be total, and many equal breakpoints (heights rounded to centimetres) do no harm.
-pub(super) fn crossing(
-    points: &mut [Break],
+/// Where rounding lets none or all of them do so it is the first or the last; `None` without
+/// breakpoints. Reorders them. The time is linear in the mean, also with many equal breakpoints
+/// (heights rounded to centimetres), and it ends whatever the order is.
+pub(super) fn crossing<T: Copy>(
+    points: &mut [Break<T>],
     mut slope: f64,
-    before: impl Fn(&Break, &Break) -> bool,
-) -> Option<usize> {
-    let (mut low, mut high) = (0, points.len());
-    while high - low > 1 {
-        let pivot = middle(&points[low..high], &before);
-        let (mut split, rise) = partition(&mut points[low..high], |point| before(point, &pivot));
-        if split > 0 && slope + rise >= 0.0 {
-            high = low + split;
+    before: impl Fn(&T, &T) -> bool,
+) -> Option<T> {
+    let mut count = points.len();
+    let mut last = None;
+    while count > 0 {
+        let pivot = middle(&points[..count], &before);
+        let below = rise(&points[..count], |key| before(key, &pivot));
+        if slope + below >= 0.0 {
+            last = Some(pivot);
+            count = keep(&mut points[..count], |key| before(key, &pivot));
             continue;
         }
-        slope += rise;
-        low += split;
-        // The pivot and its equals.
-        let (equal, rise) = partition(&mut points[low..high], |point| !before(&pivot, point));
-        split = low + equal;
-        if slope + rise >= 0.0 {
-            return first_of_equals(&points[low..split], slope).map(|place| low + place);
+        let reached = rise(&points[..count], |key| !before(&pivot, key));
+        if slope + reached >= 0.0 {
+            return Some(pivot);
         }
-        slope += rise;
-        low = split;
+        slope += reached;
+        last = Some(pivot);
+        count = keep(&mut points[..count], |key| before(&pivot, key));
     }
-    if low < high { Some(low) } else { points.len().checked_sub(1) }
+    last
 }
 
-fn first_of_equals(points: &[Break], mut slope: f64) -> Option<usize> {
-    let crosses = |point: &Break| {
-        slope += point.rise;
-        slope >= 0.0
-    };
-    points.iter().position(crosses).or(points.len().checked_sub(1))
+/// Total rise of the breakpoints that satisfy a condition, in four sums at a time.
+fn rise<T: Copy>(points: &[Break<T>], counts: impl Fn(&T) -> bool) -> f64 {
+    let value = |point: &Break<T>| if counts(&point.key) { point.rise } else { 0.0 };
+    let mut sums = [0.0; 4];
+    let (fours, rest) = points.as_chunks::<4>();
+    for four in fours {
+        sums.iter_mut().zip(four).for_each(|(sum, point)| *sum += value(point));
+    }
+    sums.iter().sum::<f64>() + rest.iter().map(value).sum::<f64>()
 }
 
-/// Moves the breakpoints that satisfy a condition to the front; their number and total rise.
-fn partition(points: &mut [Break], first: impl Fn(&Break) -> bool) -> (usize, f64) {
-    let (mut split, mut rise) = (0, 0.0);
+/// Moves the breakpoints that satisfy a condition to the front; how many do.
+fn keep<T: Copy>(points: &mut [Break<T>], belongs: impl Fn(&T) -> bool) -> usize {
+    let mut count = 0;
     for place in 0..points.len() {
         let point = points[place];
-        let belongs = first(&point);
-        points[place] = points[split];
-        points[split] = point;
-        rise += if belongs { point.rise } else { 0.0 };
-        split += usize::from(belongs);
+        points[count] = point;
+        count += usize::from(belongs(&point.key));
     }
-    (split, rise)
+    count
 }
 
 /// The median of the first, the middle and the last.
-fn middle(points: &[Break], before: &impl Fn(&Break, &Break) -> bool) -> Break {
-    let (mut a, b, mut c) = (points[0], points[points.len() / 2], points[points.len() - 1]);
+fn middle<T: Copy>(points: &[Break<T>], before: &impl Fn(&T, &T) -> bool) -> T {
+    let (mut a, mut c) = (points[0].key, points[points.len() - 1].key);
+    let b = points[points.len() / 2].key;
     if before(&c, &a) {
         (a, c) = (c, a);
     }

@@ -54,65 +54,65 @@ impl<const K: usize> Descent<'_, K> {
     /// Moves along an edge to its lowest point.
     fn step(&mut self, leaving: &Leaving) -> Option<()> {
         let edge = std::array::from_fn(|i| leaving.direction * self.inverse[i][leaving.place]);
-        self.look_along(&edge);
-        let place = crossing(&mut self.scratch.points, leaving.slope, |a, b| a.t < b.t)?;
-        let t = self.scratch.points[place].t;
+        let count = self.look_along(&edge);
+        let points = &mut self.scratch.points[..count];
+        let t = crossing(points, leaving.slope, |a, b| a < b)?;
         let slope = leaving.slope + self.advance(t);
         let entering = self.entering(slope)?;
         self.exchange(leaving, entering)
     }
 
-    /// Finds where residuals and slacks become nought along an edge.
-    fn look_along(&mut self, edge: &[f64; K]) {
+    /// Finds where residuals and slacks become nought along an edge; how many do.
+    fn look_along(&mut self, edge: &[f64; K]) -> usize {
+        let n = self.rows();
         let Scratch { residual, signed, along, points, .. } = &mut *self.scratch;
-        points.clear();
-        let noise = ROUNDING * (0..K).map(|k| edge[k].abs() * self.widest[k]).sum::<f64>();
-        let mut note = |at: usize, change: f64, noise: f64| {
+        points.resize(residual.len(), Break::default());
+        let mut count = 0;
+        // Without branches: whether a residual shrinks is as good as random.
+        let mut note = |residual: f64, signed: f64, along: &mut f64, change: f64, noise: f64| {
             let change = if change.abs() > noise { change } else { 0.0 };
-            along[at] = change;
-            if signed[at] * change < 0.0 {
-                let (t, rise) = (-residual[at] / change, -2.0 * signed[at] * change);
-                points.push(Break { t: t.max(0.0), rise, at });
-            }
+            *along = change;
+            let (t, rise) = (-residual / change, -2.0 * signed * change);
+            points[count] = Break { key: if t > 0.0 { t } else { 0.0 }, rise };
+            count += usize::from(rise > 0.0);
         };
-        for (at, row) in self.program.rows.iter().enumerate() {
-            note(at, dot(&row.d, edge), noise);
+        let noise = ROUNDING * (0..K).map(|k| edge[k].abs() * self.widest[k]).sum::<f64>();
+        let lanes = residual.iter().zip(signed.iter()).zip(along.iter_mut());
+        for (row, ((residual, signed), along)) in self.program.rows.iter().zip(lanes) {
+            note(*residual, *signed, along, dot(&row.d, edge), noise);
         }
-        for (at, cone) in (self.program.rows.len()..).zip(&self.program.cones) {
+        for (cone, at) in self.program.cones.iter().zip(n..) {
             let noise = ROUNDING * size(edge) * size(&cone.rows[0]);
-            note(at, dot(&cone.rows[0], edge), noise);
+            note(residual[at], signed[at], &mut along[at], dot(&cone.rows[0], edge), noise);
         }
+        count
     }
 
     /// Moves all residuals, turns the rows that are passed and collects those that are reached.
     /// Returns by how much the slope has risen.
     fn advance(&mut self, t: f64) -> f64 {
         let n = self.rows();
-        let Scratch { residual, signed, along, tiny, tied, .. } = &mut *self.scratch;
+        let Scratch { residual, signed, along, tiny, tied, met, .. } = &mut *self.scratch;
         let mut rise = 0.0;
-        tied.clear();
-        for at in 0..n {
-            let value = residual[at] + t * along[at];
-            residual[at] = value;
-            let reached = value.abs() <= tiny[0];
-            if (reached || value * signed[at] < 0.0) && signed[at] * along[at] < 0.0 {
-                if reached {
-                    residual[at] = 0.0;
-                    tied.push(at);
-                } else {
-                    rise -= 2.0 * signed[at] * along[at];
-                    signed[at] = -signed[at];
-                    let row = &self.program.rows[at];
-                    let turn = 2.0 * signed[at];
-                    self.gradient.iter_mut().zip(&row.d).for_each(|(sum, d)| *sum += turn * d);
-                }
-            }
+        met.resize(residual.len(), 0);
+        let mut count = 0;
+        let lanes = residual.iter_mut().zip(signed.iter()).zip(along.iter());
+        for (at, ((residual, signed), along)) in lanes.enumerate() {
+            *residual += t * along;
+            met[count] = at;
+            let near = tiny[(1 + at).saturating_sub(n)];
+            let beyond = *residual * f64::copysign(1.0, *signed) <= near;
+            count += usize::from(beyond & (signed * along < 0.0));
         }
-        for at in n..residual.len() {
-            residual[at] = (residual[at] + t * along[at]).max(0.0);
-            if residual[at] <= tiny[1 + at - n] && signed[at] * along[at] < 0.0 {
+        tied.clear();
+        for &at in &met[..count] {
+            if at >= n || residual[at].abs() <= tiny[0] {
                 residual[at] = 0.0;
                 tied.push(at);
+            } else {
+                rise -= 2.0 * signed[at] * along[at];
+                signed[at] = -signed[at];
+                add(&mut self.gradient, &self.program.rows[at].d, 2.0 * signed[at]);
             }
         }
         rise
@@ -130,17 +130,26 @@ impl<const K: usize> Descent<'_, K> {
         if let [only] = self.scratch.tied[..] {
             return Some(only);
         }
-        let mut points: Vec<Break> = Vec::with_capacity(self.scratch.tied.len());
+        let mut points: Vec<Break<usize>> = Vec::with_capacity(self.scratch.tied.len());
         for &at in &self.scratch.tied {
             let (signed, along) = (self.scratch.signed[at], self.scratch.along[at]);
-            points.push(Break { t: 0.0, rise: -2.0 * signed * along, at });
+            points.push(Break { key: at, rise: -2.0 * signed * along });
         }
         let order = self.order();
-        let place =
-            crossing(&mut points, slope, |a, b| a.at != b.at && self.sooner(&order, a.at, b.at))?;
-        let n = self.rows();
-        points[..place].iter().filter(|p| p.at < n).for_each(|p| self.turn(p.at));
-        Some(points[place].at)
+        let before = |a: &usize, b: &usize| a != b && self.sooner(&order, *a, *b);
+        let entering = crossing(&mut points, slope, before)?;
+        self.turn_before(&order, entering);
+        Some(entering)
+    }
+
+    /// Turns those of the rows reached that come before an item.
+    fn turn_before(&mut self, order: &[usize; K], item: usize) {
+        for place in 0..self.scratch.tied.len() {
+            let at = self.scratch.tied[place];
+            if at != item && at < self.rows() && self.sooner(order, at, item) {
+                self.turn(at);
+            }
+        }
     }
 
     /// The places of the basis in the order of their infinitesimals.
@@ -162,13 +171,14 @@ impl<const K: usize> Descent<'_, K> {
             })
         };
         let (of_a, of_b) = (shares(a), shares(b));
+        let rounding = 1e-9 * size(&of_a).max(size(&of_b));
         let next = a.min(b);
         for &place in order {
             if next < self.basis[place] {
                 break;
             }
             let (of_a, of_b) = (of_a[place], of_b[place]);
-            if (of_a - of_b).abs() > 1e-9 * (of_a.abs() + of_b.abs()) {
+            if (of_a - of_b).abs() > rounding {
                 return of_a < of_b;
             }
         }
@@ -195,6 +205,10 @@ impl<const K: usize> Descent<'_, K> {
         self.inverse = invert(std::array::from_fn(|k| self.normal(self.basis[k])))?;
         Some(())
     }
+}
+
+fn add<const K: usize>(sum: &mut [f64; K], vector: &[f64; K], factor: f64) {
+    sum.iter_mut().zip(vector).for_each(|(sum, value)| *sum += factor * value);
 }
 
 fn size<const K: usize>(vector: &[f64; K]) -> f64 {
