@@ -104,7 +104,7 @@ pub const TREE_COLUMNS: &[Column] = &[
         MILLIMETRES,
         M,
         POSITIVE,
-        "Radius around the stem of the positions whose fit is within 0.1 % of the best; missing where not computed",
+        "Radius around the stem of the positions, within the prior, whose fit is within 0.1 % of the best; missing where not computed",
         |tree, _| Value::Real(tree.position_extent_m),
     ),
     column(
@@ -112,7 +112,7 @@ pub const TREE_COLUMNS: &[Column] = &[
         MILLIMETRES,
         M,
         POSITIVE,
-        "Standard error of the stem position, both axes together; missing without one",
+        "Asymptotic standard error of the stem position without regard to the prior, both axes together; missing without one",
         |tree, _| Value::Real(tree.position_standard_error_m),
     ),
     column(

@@ -138,10 +138,11 @@ pub struct Tree {
     pub position_m: [f64; 2],
     /// The method that made the position.
     pub position_method: PositionMethod,
-    /// Radius around the position of the centres whose best surface has an objective within 0.1 %
-    /// of the smallest, metres; NaN where it was not computed.
+    /// Radius around the position of the centres, within the prior, whose best surface has an
+    /// objective within 0.1 % of the smallest, metres; NaN where it was not computed.
     pub position_extent_m: f64,
-    /// Asymptotic standard error of the position, metres (both axes together); NaN without one.
+    /// Asymptotic standard error of the position without regard to the prior, metres (both axes
+    /// together); NaN without one.
     pub position_standard_error_m: f64,
     /// World position of the fitted surface's centre, metres; NaN without a surface that has one. It
     /// is the position, unless the flags say why not.
