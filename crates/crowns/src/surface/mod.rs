@@ -31,6 +31,7 @@ mod clarabel;
 mod dense;
 mod dual;
 mod engine;
+mod extent;
 mod formulate;
 mod interior;
 mod l1;

@@ -3,6 +3,7 @@
 use super::super::dense::dot;
 use super::super::program::Program;
 use super::Scratch;
+use super::step::invert;
 
 /// Share of the terms of a sum below which it counts as nought.
 pub(super) const ROUNDING: f64 = 1e-13;
@@ -17,6 +18,8 @@ pub(super) struct Descent<'a, const K: usize> {
     /// Values of the artificial rows: the start.
     origin: [f64; K],
     pub(super) basis: [usize; K],
+    /// The basis of the start.
+    first: [usize; K],
     /// Column `k` is the edge along which member `k` of the basis grows at rate 1.
     pub(super) inverse: [[f64; K]; K],
     /// Of the rows outside the basis, each on its side.
@@ -51,7 +54,33 @@ impl<'a, const K: usize> Descent<'a, K> {
         let first = program.rows.len() + program.cones.len();
         let basis = std::array::from_fn(|k| first + k);
         let inverse = std::array::from_fn(|i| std::array::from_fn(|k| f64::from(u8::from(i == k))));
-        Self { program, scratch, origin, basis, inverse, gradient: [0.0; K], terms, widest }
+        let (first, gradient) = (basis, [0.0; K]);
+        Self { program, scratch, origin, basis, first, inverse, gradient, terms, widest }
+    }
+
+    /// Starts at another basis; `None` if that is singular or its vertex violates a bound.
+    pub(super) fn start_at(&mut self, basis: &[usize; K]) -> Option<()> {
+        self.inverse = invert(basis.map(|item| self.normal(item)))?;
+        (self.basis, self.first) = (*basis, *basis);
+        let x = self.point();
+        let bounds = self.program.cones.iter().zip(&self.scratch.tiny[1..]);
+        for (cone, tiny) in bounds {
+            if cone.at(&x)[0] < -tiny {
+                return None;
+            }
+        }
+        for &item in basis {
+            if let Some(signed) = self.scratch.signed.get_mut(item) {
+                *signed = 0.0;
+            }
+        }
+        Some(())
+    }
+
+    /// Rank of an item's infinitesimal, 0 being the largest: those of the first basis are smallest.
+    pub(super) fn rank(&self, item: usize) -> usize {
+        let place = self.first.iter().position(|&first| first == item);
+        place.map_or(item, |place| usize::MAX - place)
     }
 
     pub(super) fn rows(&self) -> usize {
@@ -129,6 +158,16 @@ impl<'a, const K: usize> Descent<'a, K> {
     /// Multipliers of the basis: `basis' * multipliers = -gradient`.
     pub(super) fn multipliers(&self) -> [f64; K] {
         std::array::from_fn(|k| -(0..K).map(|i| self.gradient[i] * self.inverse[i][k]).sum::<f64>())
+    }
+
+    /// By how much the objective changes when the values of the rows do: the sum of these changes
+    /// times the multipliers.
+    pub(super) fn sensitivity(&self, change: impl Fn(usize) -> f64) -> f64 {
+        let sides = &self.scratch.signed[..self.rows()];
+        let outside: f64 = sides.iter().zip(0..).map(|(side, row)| side * change(row)).sum();
+        let members = self.basis.iter().zip(self.multipliers());
+        let rows = members.filter(|(item, _)| **item < self.rows());
+        outside + rows.map(|(&row, multiplier)| multiplier * change(row)).sum::<f64>()
     }
 
     /// Rounding of the multiplier of a member.

@@ -72,6 +72,45 @@ pub(super) fn solve_with<const K: usize>(
     sound.then_some(Optimum { x, objective, lower_bound, iterations })
 }
 
+/// Where a descent ended: the start of that of a similar program.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Vertex<const K: usize> {
+    pub(super) x: [f64; K],
+    pub(super) objective: f64,
+    /// By how much the objective changes per change of the program.
+    pub(super) slope: f64,
+    basis: [usize; K],
+}
+
+/// The optimum of one of a series of programs with the same rows and bounds but other numbers, from
+/// that of the one before. Without certificate, and any of several optimal points.
+///
+/// `change` says by how much the value of a row changes at a point while the program goes on.
+pub(super) fn solve_near<const K: usize>(
+    program: &Program<K>,
+    before: Option<&Vertex<K>>,
+    scratch: &mut Scratch,
+    change: impl Fn(usize, &[f64; K]) -> f64,
+) -> Option<Vertex<K>> {
+    let warm = before.and_then(|vertex| {
+        let mut descent = Descent::new(program, vertex.x, scratch);
+        descent.start_at(&vertex.basis)?;
+        finish(descent, &change)
+    });
+    warm.or_else(|| finish(Descent::new(program, start(program)?, scratch), &change))
+}
+
+fn finish<const K: usize>(
+    mut descent: Descent<'_, K>,
+    change: &impl Fn(usize, &[f64; K]) -> f64,
+) -> Option<Vertex<K>> {
+    descent.run()?;
+    let (x, basis) = (descent.point(), descent.basis);
+    let objective = descent.program.objective(&x);
+    let slope = descent.sensitivity(|row| change(row, &x));
+    Some(Vertex { x, objective, slope, basis })
+}
+
 /// The solution of the least squares problem under the bounds.
 fn start<const K: usize>(program: &Program<K>) -> Option<[f64; K]> {
     let free = least_squares(&program.rows)?;

@@ -155,7 +155,7 @@ impl<const K: usize> Descent<'_, K> {
     /// The places of the basis in the order of their infinitesimals.
     fn order(&self) -> [usize; K] {
         let mut order = std::array::from_fn(|k| k);
-        order.sort_unstable_by_key(|&place| self.basis[place]);
+        order.sort_unstable_by_key(|&place| self.rank(self.basis[place]));
         order
     }
 
@@ -172,9 +172,9 @@ impl<const K: usize> Descent<'_, K> {
         };
         let (of_a, of_b) = (shares(a), shares(b));
         let rounding = 1e-9 * size(&of_a).max(size(&of_b));
-        let next = a.min(b);
+        let next = if self.rank(a) < self.rank(b) { a } else { b };
         for &place in order {
-            if next < self.basis[place] {
+            if self.rank(next) < self.rank(self.basis[place]) {
                 break;
             }
             let (of_a, of_b) = (of_a[place], of_b[place]);
