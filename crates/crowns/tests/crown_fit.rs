@@ -219,6 +219,7 @@ fn the_prior_holds_the_position_in_its_box() {
         |half: f64| CrownFitParams { prior_half_width_m: half, ..CrownFitParams::default() };
     let fixed = known(&box_of(0.0));
     assert_eq!(fixed.position_m, [fixed.apex_m[0], fixed.apex_m[1]]);
+    assert_eq!(fixed.position_extent_m, 0.0);
     let narrow = known(&box_of(0.1));
     assert!(TreeFlag::names(narrow.flags).contains("prior-active"));
     let free = CrownFitParams { prior: PriorRule::None, ..CrownFitParams::default() };
@@ -251,7 +252,9 @@ fn both_solvers_agree() {
 #[test]
 fn uncertainty_is_told_unless_it_is_not_wanted() {
     let told = known(&CrownFitParams::default());
-    assert!(told.position_standard_error_m > 0.0 && told.position_standard_error_m < 0.5);
+    for metres in [told.position_extent_m, told.position_standard_error_m] {
+        assert!(metres > 0.0 && metres < 0.5, "{metres} m");
+    }
     let quiet = known(&CrownFitParams { uncertainty: false, ..CrownFitParams::default() });
     assert!(quiet.position_extent_m.is_nan() && quiet.position_standard_error_m.is_nan());
     assert_eq!(quiet.position_m, told.position_m);

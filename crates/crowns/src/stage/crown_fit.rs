@@ -125,8 +125,7 @@ fn tree_of(
     if !points.is_empty() {
         let placed = place(&mut tree, points, near, params);
         flags.extend(placed.flags);
-        if let Some(reason) = placed.unfitted {
-            let message = format!("no crown fit, highest point kept: {reason}");
+        if let Some(message) = placed.warning {
             context.warn(format!("tree {}", model.id), message);
         }
         add_outline(&mut tree, points, near, params);

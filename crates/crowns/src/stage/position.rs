@@ -21,8 +21,8 @@ const EQUAL_AXES: f64 = 1e-9;
 pub(super) struct Placed {
     /// What is remarkable.
     pub(super) flags: Vec<TreeFlag>,
-    /// Why there is no surface although one was asked for.
-    pub(super) unfitted: Option<String>,
+    /// What did not work.
+    pub(super) warning: Option<String>,
 }
 
 /// Puts a tree, which is at its highest point so far, where the method says, and describes the
@@ -41,16 +41,20 @@ pub(super) fn place(
         Err(error) => {
             let nothing = matches!(error, Error::NoCells);
             let flag = if nothing { TreeFlag::Underdetermined } else { TreeFlag::FitFailed };
-            Placed { flags: vec![flag], unfitted: Some(error.to_string()) }
+            Placed { flags: vec![flag], warning: Some(unfitted(error)) }
         }
     }
+}
+
+fn unfitted(reason: impl std::fmt::Display) -> String {
+    format!("no crown fit, highest point kept: {reason}")
 }
 
 /// What a method found, relative to the tree's highest point.
 struct Solved {
     cells: Vec<[f64; 3]>,
     fit: Fit,
-    uncertainty: Option<Uncertainty>,
+    uncertainty: Result<Option<Uncertainty>, Error>,
 }
 
 fn solve(
@@ -68,7 +72,7 @@ fn solve(
     let problem = Problem { prior: prior(params), ..Problem::new(&cells) };
     let fit = fit(params, &problem)?;
     let sought = params.uncertainty && params.method == FitMethod::L1;
-    let uncertainty = if sought { l1(params).uncertainty(&problem, &fit)? } else { None };
+    let uncertainty = if sought { l1(params).uncertainty(&problem, &fit) } else { Ok(None) };
     Ok(Solved { fit, uncertainty, cells })
 }
 
@@ -120,16 +124,22 @@ fn describe(tree: &mut Tree, solved: &Solved, method: FitMethod) -> Placed {
         tree.fit_gap = certificate.relative_gap();
         tree.fit_nodes = certificate.nodes;
     }
-    if let Some(found) = uncertainty {
-        tree.position_standard_error_m = found.standard_error_m;
+    let mut warning = None;
+    match uncertainty {
+        Ok(None) => {}
+        Ok(Some(found)) => {
+            tree.position_extent_m = found.extent_m;
+            tree.position_standard_error_m = found.standard_error_m;
+        }
+        Err(error) => warning = Some(format!("uncertainty of the crown fit unknown: {error}")),
     }
-    let determined = lacks(Flag::Underdetermined) && lacks(Flag::NotElliptic);
-    if determined && lacks(Flag::CentreOutsideData) {
+    if !lacks(Flag::Underdetermined) || !lacks(Flag::NotElliptic) {
+        warning = Some(unfitted(reason(cells.len(), lacks(Flag::NotElliptic))));
+    } else if lacks(Flag::CentreOutsideData) {
         tree.position_method = wire_method(method);
         tree.position_m = [0, 1].map(|axis| quantise(tree.apex_m[axis] + fit.position[axis]));
     }
-    let unfitted = (!determined).then(|| reason(cells.len(), lacks(Flag::NotElliptic)));
-    Placed { flags, unfitted }
+    Placed { flags, warning }
 }
 
 fn reason(cells: usize, undetermined: bool) -> String {
