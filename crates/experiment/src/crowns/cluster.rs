@@ -7,8 +7,8 @@ use timberline_crowns::footprint::footprint;
 pub struct Cluster {
     /// Number, unique among the clusters of a run.
     pub id: u64,
-    /// What it belongs to: the plot or the survey.
-    pub group: String,
+    /// Which repetition of its dataset it belongs to.
+    pub repeat: u64,
     /// Points in any one metric frame, best near the tree.
     pub points: Vec<[f64; 3]>,
     /// Position of the stem in the same frame, m.

@@ -13,10 +13,10 @@ use rayon::prelude::*;
 use serde::Serialize;
 use timberline_synth::{Cohort, Layout, Share, Species};
 
-/// How the tops of trees stand to their stems. The reference is the foot of the stem; with upright
-/// and even trees every method would find it.
+/// How trees differ from upright and even ones. The reference is the foot of the stem; above it
+/// every method would find an even crown.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Tops {
+pub struct Growth {
     /// Deviation of the lean of stems, degrees (half-normal, cut at three deviations).
     pub lean_deg: f64,
     /// Share of trees whose leader broke and was replaced by a side branch.
@@ -26,6 +26,12 @@ pub struct Tops {
     /// Deviation of the crown's widest section from the stem, in crown radii, each axis (normal,
     /// cut at two deviations), beside what the neighbours push.
     pub asymmetry: f64,
+    /// Share of crowns with a bare flank, shaded to death.
+    pub bare_share: f64,
+    /// Width of the bare sector, degrees: smallest and largest.
+    pub bare_angle_deg: [f64; 2],
+    /// Distance from the top beyond which the sector is bare, in crown radii: smallest and largest.
+    pub bare_beyond: [f64; 2],
 }
 
 /// What an automatic segmentation does wrong.
@@ -81,8 +87,10 @@ pub struct DatasetParams {
     pub crown_overlap: f64,
     /// Laser pulses per square metre.
     pub pulses_per_m2: f64,
-    /// Tops and stems.
-    pub tops: Tops,
+    /// Deviation of the position of a pulse in the plane, m.
+    pub horizontal_noise_m: f64,
+    /// Stems, tops and flanks.
+    pub growth: Growth,
     /// Errors of the segments.
     pub errors: SegmentErrors,
 }
@@ -93,17 +101,21 @@ impl DatasetParams {
     pub fn spruce() -> Self {
         Self {
             name: "I".to_owned(),
-            cohort: cohort(Species::NorwaySpruce, 520.0, [3.4, 14.0, 8.0], 0.62),
+            cohort: cohort(Species::NorwaySpruce, 350.0, [3.4, 12.4, 8.0], 0.62),
             understorey: None,
             site: 1.0,
-            crown_scale: 1.0,
+            crown_scale: 1.45,
             crown_overlap: 0.2,
-            pulses_per_m2: 14.0,
-            tops: Tops {
+            pulses_per_m2: 22.0,
+            horizontal_noise_m: 0.06,
+            growth: Growth {
                 lean_deg: 0.8,
                 broken_share: 0.0,
                 broken_offset_m: [0.0; 2],
                 asymmetry: 0.06,
+                bare_share: 0.9,
+                bare_angle_deg: [90.0, 180.0],
+                bare_beyond: [0.4, 0.7],
             },
             errors: SegmentErrors::none(),
         }
@@ -114,24 +126,28 @@ impl DatasetParams {
     pub fn douglas_fir() -> Self {
         Self {
             name: "II".to_owned(),
-            cohort: cohort(Species::DouglasFir, 330.0, [3.4, 20.0, 12.0], 0.55),
+            cohort: cohort(Species::DouglasFir, 230.0, [3.4, 17.2, 12.0], 0.55),
             understorey: Some(cohort(Species::WesternHemlock, 250.0, [1.8, 5.0, 3.0], 0.7)),
             site: 1.0,
-            crown_scale: 0.85,
+            crown_scale: 1.18,
             crown_overlap: 0.3,
-            pulses_per_m2: 8.0,
-            tops: Tops {
-                lean_deg: 0.45,
-                broken_share: 0.08,
-                broken_offset_m: [0.3, 0.9],
-                asymmetry: 0.1,
+            pulses_per_m2: 12.0,
+            horizontal_noise_m: 0.1,
+            growth: Growth {
+                lean_deg: 0.3,
+                broken_share: 0.15,
+                broken_offset_m: [0.2, 0.7],
+                asymmetry: 0.06,
+                bare_share: 0.9,
+                bare_angle_deg: [90.0, 180.0],
+                bare_beyond: [0.4, 0.7],
             },
             errors: SegmentErrors {
-                cut_share: 0.25,
-                cut_at: [0.2, 0.7],
-                merged_share: 0.35,
+                cut_share: 0.4,
+                cut_at: [0.1, 0.6],
+                merged_share: 0.5,
                 merged_part: [0.3, 1.0],
-                leak_reach_m: 1.0,
+                leak_reach_m: 1.2,
                 leak_share: 0.25,
                 understorey_share: 0.5,
             },

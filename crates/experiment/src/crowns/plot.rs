@@ -1,7 +1,7 @@
 //! One plot of a dataset: a stand grown, bent, scanned and segmented.
 
 use super::cluster::Cluster;
-use super::dataset::{DatasetParams, Tops};
+use super::dataset::{DatasetParams, Growth};
 use super::segment::Segmenter;
 use crate::Error;
 use timberline_pointcloud::Rect;
@@ -38,12 +38,10 @@ pub(crate) fn plot(params: &DatasetParams, seed: u64, index: u64) -> Result<Vec<
         let [x, y, _] = tree.crown.top_m;
         tree.stand == CANOPY && tree.visible && tree.exposed >= EXPOSED && inner.contains(x, y)
     };
-    let name = format!("{}-{seed}-{index}", params.name);
     let mut clusters = Vec::new();
     for tree in scene.forest().trees.iter().filter(located) {
         let mut stream = stream(params, seed, index, u64::from(tree.id) << 1);
-        let cluster = segmenter.cluster(tree, &params.errors, &mut stream)?;
-        clusters.push(Cluster { group: name.clone(), ..cluster });
+        clusters.push(segmenter.cluster(tree, params, &mut stream)?);
     }
     Ok(clusters)
 }
@@ -82,7 +80,10 @@ fn scene_params(params: &DatasetParams, seed: u64, index: u64) -> SceneParams {
         terrain: TerrainParams::default(),
         stands: cohorts.enumerate().map(stand).collect(),
         undergrowth: Undergrowth::default(),
-        scanner: ScannerParams::default().with_density(params.pulses_per_m2),
+        scanner: ScannerParams {
+            horizontal_noise_m: params.horizontal_noise_m,
+            ..ScannerParams::default().with_density(params.pulses_per_m2)
+        },
     }
 }
 
@@ -93,7 +94,7 @@ fn bent(params: &DatasetParams, scene: SceneParams) -> Result<Scene, Error> {
     for tree in trees.iter_mut().filter(|tree| tree.stand == CANOPY) {
         let name = (u64::from(tree.id) << 1) | 1;
         let mut stream = Stream::new(straight.params().seed, Domain::Experiment, name);
-        bend(tree, &params.tops, &mut stream);
+        bend(tree, &params.growth, &mut stream);
         let [x, y, _] = straight.frame().world_from_local(tree.crown.top_m);
         tree.ground_below_top_m = straight.terrain().elevation_m(x, y);
     }
@@ -102,17 +103,17 @@ fn bent(params: &DatasetParams, scene: SceneParams) -> Result<Scene, Error> {
 
 /// Gives a tree another lean, a broken top, an uneven crown. What its neighbours push its crown
 /// aside stays.
-fn bend(tree: &mut Tree, tops: &Tops, stream: &mut Stream) {
+fn bend(tree: &mut Tree, growth: &Growth, stream: &mut Stream) {
     let (height, upper) = (tree.height_m, tree.crown.upper_m);
     let old = [0, 1].map(|i| (tree.crown.top_m[i] - tree.base_m[i]) / height);
-    let size = (tops.lean_deg * stream.normal().abs().min(3.0)).to_radians();
+    let size = (growth.lean_deg * stream.normal().abs().min(3.0)).to_radians();
     let (towards, tangent) = (stream.direction(), libm::tan(size));
     let aside = stream.direction();
-    let [low, high] = tops.broken_offset_m;
+    let [low, high] = growth.broken_offset_m;
     let offset = stream.within(low, high);
-    let offset = if stream.chance(tops.broken_share) { offset } else { 0.0 };
+    let offset = if stream.chance(growth.broken_share) { offset } else { 0.0 };
     let radius = tree.crown.radius_m();
-    let uneven = [0; 2].map(|_| tops.asymmetry * radius * stream.normal().clamp(-2.0, 2.0));
+    let uneven = [0; 2].map(|_| growth.asymmetry * radius * stream.normal().clamp(-2.0, 2.0));
     for i in 0..2 {
         let lean = tangent * towards[i];
         tree.crown.top_m[i] = tree.base_m[i] + lean * height + offset * aside[i];
@@ -129,8 +130,13 @@ mod tests {
     #[test]
     fn bent_trees_keep_their_feet() {
         let mut params = DatasetParams::douglas_fir();
-        params.tops =
-            Tops { lean_deg: 0.0, broken_share: 1.0, broken_offset_m: [0.5, 0.5], asymmetry: 0.0 };
+        params.growth = Growth {
+            lean_deg: 0.0,
+            broken_share: 1.0,
+            broken_offset_m: [0.5, 0.5],
+            asymmetry: 0.0,
+            ..params.growth
+        };
         let straight = Scene::new(scene_params(&params, 1, 0)).unwrap();
         let scene = bent(&params, scene_params(&params, 1, 0)).unwrap();
         let of_canopy = |scene: &Scene| -> Vec<Tree> {

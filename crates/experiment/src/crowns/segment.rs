@@ -1,7 +1,7 @@
 //! Segments of trees: true ones, and ones with the errors of an automatic segmentation.
 
 use super::cluster::Cluster;
-use super::dataset::SegmentErrors;
+use super::dataset::{DatasetParams, Growth, SegmentErrors};
 use crate::Error;
 use timberline_pointcloud::Nearest2;
 use timberline_synth::Tree;
@@ -9,6 +9,8 @@ use timberline_synth::random::Stream;
 
 /// A side of the crown is missing.
 pub const CUT: &str = "cut";
+/// The crown has a bare flank.
+pub const BARE: &str = "bare";
 /// A part of a neighbour is in the segment.
 pub const MERGED: &str = "merged";
 
@@ -52,11 +54,15 @@ impl<'a> Segmenter<'a> {
     pub(crate) fn cluster(
         &self,
         tree: &Tree,
-        errors: &SegmentErrors,
+        params: &DatasetParams,
         stream: &mut Stream,
     ) -> Result<Cluster, Error> {
+        let errors = &params.errors;
         let mut points: Vec<[f64; 3]> = self.of(tree).collect();
         let mut faults = Vec::new();
+        if bare_flank(tree, &params.growth, &mut points, stream) {
+            faults.push(BARE);
+        }
         let leaked = self.leaked(tree, &points, errors, stream)?;
         let (merged, cut) = (stream.chance(errors.merged_share), stream.chance(errors.cut_share));
         points.extend(leaked);
@@ -137,6 +143,30 @@ impl<'a> Segmenter<'a> {
         let limit = (2.0 * share - 1.0) * tree.crown.radius_m();
         self.of(tree).filter(|point| place(point) < limit).collect()
     }
+}
+
+/// Takes the points of a random sector out of some crowns.
+fn bare_flank(
+    tree: &Tree,
+    growth: &Growth,
+    points: &mut Vec<[f64; 3]>,
+    stream: &mut Stream,
+) -> bool {
+    let is_bare = stream.chance(growth.bare_share);
+    let middle = stream.direction();
+    let angle = stream.within(growth.bare_angle_deg[0], growth.bare_angle_deg[1]);
+    let beyond = stream.within(growth.bare_beyond[0], growth.bare_beyond[1]);
+    if is_bare {
+        let cosine = libm::cos((0.5 * angle).to_radians());
+        let [x, y, _] = tree.crown.top_m;
+        let limit = beyond * tree.crown.radius_m();
+        points.retain(|point| {
+            let (dx, dy) = (point[0] - x, point[1] - y);
+            let distance = (dx * dx + dy * dy).sqrt();
+            distance <= limit || along(tree, middle, *point) <= cosine * distance
+        });
+    }
+    is_bare
 }
 
 /// How far a point lies from a tree's top along a direction, m.
