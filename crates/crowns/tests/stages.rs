@@ -76,8 +76,15 @@ fn label_of(p: [f64; 3], tops: &[[f64; 3]]) -> (u64, f32) {
     (tree_id(nearest[0], nearest[1]), if on_surface { 0.9 } else { 0.3 })
 }
 
-/// Runs both stages over all tiles; returns the rows of both tables, sorted by id, and the warnings.
-fn run(grid: TileGrid, threads: usize) -> (Vec<CrownModel>, Vec<Tree>, Vec<String>) {
+/// Rows of both tables, sorted by id, and the warnings.
+type Results = (Vec<CrownModel>, Vec<Tree>, Vec<String>);
+
+/// Runs both stages over all tiles.
+fn run(grid: TileGrid, threads: usize) -> Results {
+    run_with(grid, threads, &CrownFitParams::default())
+}
+
+fn run_with(grid: TileGrid, threads: usize, fit: &CrownFitParams) -> Results {
     let folder = tempfile::tempdir().unwrap();
     let campaign = Campaign { grid: Some(grid), ..Campaign::default() };
     let mut store = Alone::new(folder.path(), campaign);
@@ -117,8 +124,7 @@ fn run(grid: TileGrid, threads: usize) -> (Vec<CrownModel>, Vec<Tree>, Vec<Strin
             pool.install(|| store.run::<CrownModelStage>(unit.clone(), None, &params)).unwrap();
         models.extend(read::<CrownModels>(&path).unwrap().1.models);
         warnings.extend(read_header(&path).unwrap().warnings);
-        let params = CrownFitParams::default();
-        let path = pool.install(|| store.run::<CrownFitStage>(unit, None, &params)).unwrap();
+        let path = pool.install(|| store.run::<CrownFitStage>(unit, None, fit)).unwrap();
         trees.extend(read::<Trees>(&path).unwrap().1.trees);
     }
     models.sort_by_key(|model| model.id);
@@ -165,16 +171,21 @@ fn positions_are_nearer_to_the_stem_than_the_highest_points() {
 
 #[test]
 fn tiles_and_threads_do_not_matter() {
-    let debug = |result: &(Vec<CrownModel>, Vec<Tree>, Vec<String>)| {
+    let debug = |result: &Results| {
         let mut warnings = result.2.clone();
         warnings.sort();
         // Not-a-number fields are equal as text.
         format!("{:?} {:?} {warnings:?}", result.0, result.1)
     };
-    let whole = debug(&run(TileGrid::new(64, [0, 0]).unwrap(), 1));
-    for (grid, threads) in [((16, [0, 0]), 2), ((32, [7, 11]), 1), ((32, [16, 16]), 2)] {
-        let cut = debug(&run(TileGrid::new(grid.0, grid.1).unwrap(), threads));
-        assert!(cut == whole, "tiles of {} m from {:?}", grid.0, grid.1);
+    // Two axes in a narrow box: a search of its own in every tree.
+    let searched =
+        CrownFitParams { omega: 0.3, prior_half_width_m: 0.15, ..CrownFitParams::default() };
+    for fit in [CrownFitParams::default(), searched] {
+        let whole = debug(&run_with(TileGrid::new(64, [0, 0]).unwrap(), 1, &fit));
+        for (grid, threads) in [((16, [0, 0]), 2), ((32, [7, 11]), 1), ((32, [16, 16]), 2)] {
+            let cut = debug(&run_with(TileGrid::new(grid.0, grid.1).unwrap(), threads, &fit));
+            assert!(cut == whole, "tiles of {} m from {:?}, omega {}", grid.0, grid.1, fit.omega);
+        }
     }
 }
 
