@@ -22,7 +22,7 @@ const FARTHEST: f64 = 10.0;
 
 /// Accuracy, relative, at which the search along a ray ends, with a derivative and without. One more
 /// step without a check follows, which leaves less than 1 %.
-const NEAR: [f64; 2] = [0.05, 0.01];
+const NEAR: [f64; 2] = [0.05, 0.02];
 
 /// Halvings and steps that are never needed (about 2).
 const MAX_STEPS: u32 = 40;
@@ -160,7 +160,8 @@ impl<'a> Profiler<'a> {
     /// is nearly straight where the rise is nearly quadratic; within a bracket.
     fn reach(&mut self, ray: &Ray, base: f64, guess: f64) -> Result<f64, Error> {
         let target = (RISE * base).sqrt();
-        let (mut low, mut height, mut high) = (0.0, 0.0, None);
+        let (mut low, mut high) = (0.0, None);
+        let mut last = [0.0; 2];
         let mut at = guess.min(ray.most);
         for _ in 0..MAX_STEPS {
             if at <= low {
@@ -168,9 +169,10 @@ impl<'a> Profiler<'a> {
             }
             let profile = self.at(ray, at)?;
             let root = (profile.objective - base).max(0.0).sqrt();
-            let secant = (root - height) / (at - low);
+            let secant = (root - last[1]) / (at - last[0]);
             let rate = profile.slope.filter(|s| *s > 0.0).map_or(secant, |s| 0.5 * s / root);
             let next = at + (target - root) / rate.max(f64::MIN_POSITIVE);
+            last = [at, root];
             let near = NEAR[usize::from(profile.slope.is_none())];
             if (root - target).abs() <= near * target {
                 return Ok(next.clamp(low, high.unwrap_or(ray.most)));
@@ -179,7 +181,7 @@ impl<'a> Profiler<'a> {
                 if at >= ray.most {
                     return Ok(ray.most);
                 }
-                (low, height) = (at, root);
+                low = at;
             } else {
                 high = Some(at);
             }
