@@ -131,7 +131,7 @@ impl DatasetParams {
             site: 1.0,
             crown_scale: 1.18,
             crown_overlap: 0.3,
-            pulses_per_m2: 12.0,
+            pulses_per_m2: 12.8,
             horizontal_noise_m: 0.1,
             growth: Growth {
                 lean_deg: 0.3,
