@@ -15,6 +15,17 @@ pub struct NamedErrors {
     pub errors: ErrorStats,
 }
 
+/// Distances of positions from the stems, by one method of finding positions.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct MethodErrors {
+    /// The method, with its parameters.
+    pub method: String,
+    /// Trees whose crown gave no surface with an apex; none of methods that need no surface.
+    pub without_surface: Option<usize>,
+    /// Statistics of the distances in the plane, metres: the bias is their mean.
+    pub errors: ErrorStats,
+}
+
 /// A report; parts that were not assessed are missing.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Report {
@@ -28,6 +39,9 @@ pub struct Report {
     pub labels: Option<LabelAccuracy>,
     /// Other quantities, for example the terrain model.
     pub errors: Vec<NamedErrors>,
+    /// Methods of finding positions, side by side.
+    #[serde(default)]
+    pub positions: Vec<MethodErrors>,
 }
 
 impl Report {
@@ -91,8 +105,29 @@ impl fmt::Display for Report {
                 labels.mean_iou
             )?;
         }
-        write_errors(f, &self.all_errors())
+        write_errors(f, &self.all_errors())?;
+        write_positions(f, &self.positions)
     }
+}
+
+fn write_positions(f: &mut fmt::Formatter<'_>, rows: &[MethodErrors]) -> fmt::Result {
+    if rows.is_empty() {
+        return Ok(());
+    }
+    writeln!(
+        f,
+        "\n{:<50}{:>7}{:>12}{:>9}{:>9}{:>9}{:>9}{:>9}",
+        "position error by method (m)", "n", "no surface", "median", "mean", "RMSE", "P95", "max"
+    )?;
+    for MethodErrors { method, without_surface, errors: e } in rows {
+        let without = without_surface.map_or_else(dash, |count| count.to_string());
+        writeln!(
+            f,
+            "{method:<50}{:>7}{without:>12}{:>9.3}{:>9.3}{:>9.3}{:>9.3}{:>9.3}",
+            e.n, e.median, e.bias, e.rmse, e.p95_abs, e.max_abs
+        )?;
+    }
+    Ok(())
 }
 
 fn write_trees(f: &mut fmt::Formatter<'_>, trees: &TreeAccuracy) -> fmt::Result {
@@ -168,6 +203,15 @@ mod tests {
         report.boxes = Some(match_boxes(&[square], &[square], 0.4).unwrap());
         report.labels = Some(crate::assess_labels(&[1, 1], &[2, 0]).unwrap());
         report.add_errors("terrain", "m", ErrorStats::of([0.25, -0.25]));
+        let method = |method: &str, without_surface, errors| MethodErrors {
+            method: method.to_owned(),
+            without_surface,
+            errors: ErrorStats::of(errors),
+        };
+        report.positions = vec![
+            method("highest point", None, [0.25, 0.75]),
+            method("L2, free axes", Some(1), [0.5, 0.5]),
+        ];
         report
     }
 
@@ -188,6 +232,10 @@ errors                          n     bias   median     RMSE median |e|  P95 |e|
 position (m)                    1    0.500    0.500    0.500      0.500    0.500    0.500
 tree height (m)                 1   -0.500   -0.500    0.500      0.500    0.500    0.500
 terrain (m)                     2    0.000    0.000    0.250      0.250    0.250    0.250
+
+position error by method (m)                            n  no surface   median     mean     RMSE      P95      max
+highest point                                           2           -    0.500    0.500    0.559    0.725    0.750
+L2, free axes                                           2           1    0.500    0.500    0.500    0.500    0.500
 ";
 
     #[test]

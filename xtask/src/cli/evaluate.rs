@@ -1,14 +1,23 @@
 //! `evaluate`: the trees and the terrain of a run against known ones.
 
+use super::known::{
+    Filter, Position, STEMS, artefacts, as_tree, clusters, read_trees, stems_of_found, trees_of_run,
+};
 use super::open::{Opened, Place};
 use super::{DONE, Program, Usage, out};
 use crate::engine::explain::DryRun;
 use anyhow::{Context, Result};
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use timberline_artefact::Kind;
-use timberline_artefact::kinds::{self, GroundModel, Trees};
+use timberline_artefact::kinds::{self, GroundModel};
 use timberline_artefact::raster::Raster;
+use timberline_artefact::stage::Stage;
+use timberline_crowns::CrownFitParams;
+use timberline_crowns::stage::CrownFitStage;
+use timberline_evaluate::report::MethodErrors;
 use timberline_evaluate::{ErrorStats, MatchParams, MatchRule, Report, Tree, assess_trees, layers};
+use timberline_experiment::crowns::{compare, plan};
 
 /// Radius in which the top height is taken that tells the layer of a tree: plots of 0.03 ha.
 const LAYER_RADIUS_M: f64 = 10.0;
@@ -62,14 +71,6 @@ pub struct Args {
     json: bool,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum Position {
-    /// Highest point
-    Apex,
-    /// Stem
-    Stem,
-}
-
 /// Runs the command.
 ///
 /// # Errors
@@ -109,15 +110,20 @@ fn add_trees(
     dry: &DryRun<'_>,
     truth: &Path,
 ) -> Result<()> {
-    let mut reference = read_trees(truth, args)?;
+    let filter = Filter { min_height_m: args.min_height, hidden: args.hidden };
+    let mut reference = read_trees(truth, args.position.columns(), filter)?;
     for (tree, layer) in
         reference.clone().iter().zip(layers(&reference, LAYER_RADIUS_M)?).enumerate()
     {
         reference[tree].layer = layer.1;
     }
+    let own = match &args.trees {
+        Some(_) => Vec::new(),
+        None => trees_of_run(opened, dry, args.min_height)?,
+    };
     let detected = match &args.trees {
-        Some(path) => read_trees(path, args)?,
-        None => trees_of_run(opened, dry, args)?,
+        Some(path) => read_trees(path, args.position.columns(), filter)?,
+        None => own.iter().map(|tree| as_tree(tree, args.position)).collect(),
     };
     let rule = if args.optimal { MatchRule::Optimal } else { MatchRule::TallestFirst };
     let params = MatchParams {
@@ -125,96 +131,62 @@ fn add_trees(
         max_height_difference_m: args.height_difference,
         rule,
     };
-    report.trees = Some(assess_trees(&reference, &detected, &params, &args.classes)?);
+    let found = assess_trees(&reference, &detected, &params, &args.classes)?;
+    // Tables that do not tell stems from tops, or trees that are not the run's, say nothing here.
+    if let (false, Ok(stems)) = (own.is_empty(), read_trees(truth, STEMS, filter)) {
+        let stems = stems_of_found(&found.matching, &reference, &detected, &stems);
+        report.positions = positions(opened, dry, &own, &stems)?;
+    }
+    report.trees = Some(found);
     Ok(())
 }
 
-/// The artefacts of a kind that are in the store.
-fn artefacts(opened: &Opened, dry: &DryRun<'_>, kind: &str) -> Result<Vec<PathBuf>> {
-    let writes = |stage: &crate::config::PipelineStage| stage.stage.info().outputs.contains(&kind);
-    let stages = &opened.pipeline.stages;
-    let position =
-        stages.iter().rposition(writes).with_context(|| format!("no stage writes `{kind}`"))?;
-    let whole = dry.stages[position].iter().filter(|plan| plan.is_whole());
-    let path = |plan: &crate::engine::plan::UnitPlan| {
-        opened.store.path(stages[position].name(), plan.unit(), &plan.task.key, kind)
+/// How far from the stem each method of fitting puts the crowns of the run, the run's own positions
+/// first.
+fn positions(
+    opened: &Opened,
+    dry: &DryRun<'_>,
+    own: &[kinds::Tree],
+    stems: &BTreeMap<u64, Tree>,
+) -> Result<Vec<MethodErrors>> {
+    let params = fit_params(opened);
+    let clusters = clusters(opened, dry, stems)?;
+    let by_id: BTreeMap<u64, &kinds::Tree> = own.iter().map(|tree| (tree.id, tree)).collect();
+    let error = |id: u64| {
+        let (stem, tree) = (stems.get(&id)?, by_id.get(&id)?);
+        let [dx, dy] = [0, 1].map(|axis| tree.position_m[axis] - stem.at_m[axis]);
+        Some((dx * dx + dy * dy).sqrt())
     };
-    let paths: Vec<PathBuf> = whole.map(path).collect();
-    if paths.is_empty() {
-        return Err(Usage(format!("the store has no `{kind}`: run the pipeline first")).into());
-    }
-    Ok(paths)
+    let run = MethodErrors {
+        method: "positions of the run".to_owned(),
+        without_surface: None,
+        errors: ErrorStats::of(clusters.iter().filter_map(|cluster| error(cluster.id))),
+    };
+    let settings = plan::side_by_side(params.prior_half_width_m);
+    let found = compare(&clusters, &settings, params.cell_m, &|| ())?;
+    let of_method = |one: &timberline_experiment::crowns::Comparison| MethodErrors {
+        method: one.setting.to_string(),
+        without_surface: (!one.setting.sees_points())
+            .then(|| one.outcomes.iter().filter(|outcome| !outcome.is_usable()).count()),
+        errors: ErrorStats::of(one.outcomes.iter().map(|outcome| outcome.error_m())),
+    };
+    Ok(std::iter::once(run).chain(found.iter().map(of_method)).collect())
 }
 
-fn trees_of_run(opened: &Opened, dry: &DryRun<'_>, args: &Args) -> Result<Vec<Tree>> {
-    let mut trees = Vec::new();
-    for path in artefacts(opened, dry, Trees::NAME)? {
-        let (_, table) = timberline_artefact::read::<Trees>(&path)?;
-        trees.extend(table.trees.iter().map(|tree| as_tree(tree, args.position)));
-    }
-    trees.retain(|tree: &Tree| tree.height_m >= args.min_height);
-    Ok(trees)
-}
-
-fn as_tree(tree: &kinds::Tree, position: Position) -> Tree {
-    let at_m = match position {
-        Position::Apex => [tree.apex_m[0], tree.apex_m[1]],
-        Position::Stem => tree.position_m,
-    };
-    let crown_diameter_m =
-        if tree.crown_area_m2 > 0.0 { tree.crown_diameter_mean_m } else { f64::NAN };
-    Tree { id: tree.id, at_m, height_m: tree.height_m, crown_diameter_m, layer: None }
-}
-
-fn read_trees(path: &Path, args: &Args) -> Result<Vec<Tree>> {
-    let place = || path.display().to_string();
-    let mut reader = csv::Reader::from_path(path).with_context(place)?;
-    let heading = reader.headers().with_context(place)?.clone();
-    let column =
-        |names: &[&str]| names.iter().find_map(|name| heading.iter().position(|own| own == *name));
-    let needed = |names: &[&str]| {
-        column(names).ok_or_else(|| Usage(format!("{}: no column {}", place(), names.join(" or "))))
-    };
-    let (x, y) = match args.position {
-        Position::Apex => (needed(&["top_x_m", "x_m", "x"])?, needed(&["top_y_m", "y_m", "y"])?),
-        Position::Stem => (
-            needed(&["base_x_m", "stem_x", "x_m", "x"])?,
-            needed(&["base_y_m", "stem_y", "y_m", "y"])?,
-        ),
-    };
-    let height = needed(&["top_above_ground_m", "height_m", "height"])?;
-    let (id, visible) = (column(&["tree_id", "id"]), column(&["visible"]));
-    let (diameter, radius) = (column(&["crown_diameter_m"]), column(&["crown_radius_m"]));
-    let mut trees = Vec::new();
-    for (index, row) in reader.records().enumerate() {
-        let row = row.with_context(place)?;
-        let number = |at: usize| {
-            row.get(at).and_then(|text| text.trim().parse::<f64>().ok()).unwrap_or(f64::NAN)
-        };
-        let seen = args.hidden || visible.is_none_or(|at| number(at) != 0.0);
-        let crown = diameter.map(&number).or_else(|| radius.map(|at| 2.0 * number(at)));
-        let own_id = id.and_then(|at| row.get(at)?.parse().ok());
-        let tree = Tree {
-            id: own_id.unwrap_or(index as u64 + 1),
-            at_m: [number(x), number(y)],
-            height_m: number(height),
-            crown_diameter_m: crown.unwrap_or(f64::NAN),
-            layer: None,
-        };
-        let high = tree.height_m.is_nan() || tree.height_m >= args.min_height;
-        if seen && high && tree.at_m.iter().all(|value| value.is_finite()) {
-            trees.push(tree);
-        }
-    }
-    Ok(trees)
+/// The run's parameters of `crown-fit`, or its defaults.
+fn fit_params(opened: &Opened) -> CrownFitParams {
+    let name = CrownFitStage::info().name;
+    let stage = opened.pipeline.stages.iter().find(|stage| stage.name() == name);
+    let given = stage.map(|stage| serde_json::from_value(stage.params.clone()));
+    given.and_then(Result::ok).unwrap_or_default()
 }
 
 /// Errors of the terrain model at the cell centres of a known one.
 fn terrain(opened: &Opened, dry: &DryRun<'_>, truth: &Path) -> Result<ErrorStats> {
     let known = read_ascii_raster(truth)?;
     let mut errors = Vec::new();
-    for path in artefacts(opened, dry, GroundModel::NAME)? {
-        let (header, model) = timberline_artefact::read::<GroundModel>(&path)?;
+    for path in artefacts(opened, dry, GroundModel::NAME)?.values() {
+        let (header, model) = timberline_artefact::read::<GroundModel>(path)?;
         let tile = header.facts.grid.zip(header.unit.tile()).map(|(grid, tile)| grid.rect(tile));
         let inside = |at: &[f64; 2]| tile.is_none_or(|rect| rect.contains(at[0], at[1]));
         let own = known.iter().filter(|(at, _)| inside(at));

@@ -5,10 +5,12 @@ pub mod cache;
 pub mod diff;
 pub mod doctor;
 pub mod evaluate;
+pub mod experiment;
 pub mod explain;
 pub mod export;
 pub mod init;
 pub mod inspect;
+pub mod known;
 pub mod open;
 pub mod out;
 pub mod picture;
@@ -76,6 +78,8 @@ enum Command {
     Export(export::Args),
     /// Compare the trees of a run with known ones
     Evaluate(evaluate::Args),
+    /// Repeat the papers' experiments
+    Experiment(experiment::Args),
     /// Measure speed and memory on a generated stand
     Bench(bench::Args),
     /// Print shell completions
@@ -134,6 +138,7 @@ impl Program {
             Command::Sample(args) => sample::run(&args),
             Command::Export(args) => export::run(&args),
             Command::Evaluate(args) => evaluate::run(self, &args),
+            Command::Experiment(args) => experiment::run(self, &args),
             Command::Bench(args) => bench::run(&args),
             Command::Completions { shell } => {
                 let mut script = Vec::new();

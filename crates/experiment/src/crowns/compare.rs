@@ -26,6 +26,12 @@ pub struct Outcome {
 }
 
 impl Outcome {
+    /// Whether the position comes from a surface with an apex.
+    #[must_use]
+    pub fn is_usable(&self) -> bool {
+        self.has_surface && !self.flags.contains(&Flag::NotElliptic)
+    }
+
     /// Distance in the plane from the reference, m.
     #[must_use]
     pub fn error_m(&self) -> f64 {

@@ -67,6 +67,35 @@ pub fn trees_csv(all: &[Assessed]) -> String {
     text
 }
 
+/// One line for every tree: where it stands and what its points are like; lengths in metres.
+#[must_use]
+pub fn clusters_csv(all: &[Assessed]) -> String {
+    let mut text = String::from(
+        "dataset,repeat,tree,stem_x_m,stem_y_m,height_m,points,enclosing_radius_m,hull_m2,\
+         points_per_m2,segment\n",
+    );
+    for one in all {
+        let dataset = one.facts.dataset.replace([',', '\n', '"'], " ");
+        for cluster in &one.clusters {
+            let ([x, y], extent) = (cluster.reference, cluster.extent());
+            // Writing to a String cannot fail.
+            let _ = writeln!(
+                text,
+                "{dataset},{},{},{x:.3},{y:.3},{:.2},{},{:.3},{:.2},{:.2},{}",
+                cluster.repeat,
+                cluster.id,
+                cluster.height_m,
+                cluster.points.len(),
+                extent.enclosing_radius_m,
+                extent.hull_m2,
+                extent.density_per_m2,
+                cluster.faults.join(" ")
+            );
+        }
+    }
+    text
+}
+
 fn setting_cells(dataset: &str, setting: &Setting, cell_m: f64) -> Vec<String> {
     let number = |value: Option<f64>| value.map(|value| value.to_string()).unwrap_or_default();
     vec![
