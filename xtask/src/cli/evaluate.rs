@@ -17,7 +17,7 @@ use timberline_crowns::CrownFitParams;
 use timberline_crowns::stage::CrownFitStage;
 use timberline_evaluate::report::MethodErrors;
 use timberline_evaluate::{ErrorStats, MatchParams, MatchRule, Report, Tree, assess_trees, layers};
-use timberline_experiment::crowns::{compare, plan};
+use timberline_experiment::crowns::{Comparison, Outcome, compare, plan};
 
 /// Radius in which the top height is taken that tells the layer of a tree: plots of 0.03 ha.
 const LAYER_RADIUS_M: f64 = 10.0;
@@ -29,7 +29,9 @@ const LAYER_RADIUS_M: f64 = 10.0;
     tree_id or id (else lines are counted); height_m or top_above_ground_m;\n  \
     for --position apex: top_x_m, top_y_m or x, y; for --position stem: base_x_m, base_y_m or stem_x, stem_y;\n  \
     optional: crown_diameter_m or crown_radius_m; visible (0 leaves the tree out unless --hidden).\n\
-    The terrain is an ESRI ASCII raster."
+    The terrain is an ESRI ASCII raster.\n\
+    With base_x_m, base_y_m or stem_x, stem_y, the crowns of the run are fitted by every method, and their distances to the stems \
+    are printed side by side: as the run chose, hull centroid, highest point, L2, L1, L1 with the run's prior."
 )]
 pub struct Args {
     /// Pipeline file [default: that of the last run]
@@ -125,13 +127,7 @@ fn add_trees(
         Some(path) => read_trees(path, args.position.columns(), filter)?,
         None => own.iter().map(|tree| as_tree(tree, args.position)).collect(),
     };
-    let rule = if args.optimal { MatchRule::Optimal } else { MatchRule::TallestFirst };
-    let params = MatchParams {
-        max_distance_m: args.distance,
-        max_height_difference_m: args.height_difference,
-        rule,
-    };
-    let found = assess_trees(&reference, &detected, &params, &args.classes)?;
+    let found = assess_trees(&reference, &detected, &match_params(args), &args.classes)?;
     // Tables that do not tell stems from tops, or trees that are not the run's, say nothing here.
     if let (false, Ok(stems)) = (own.is_empty(), read_trees(truth, STEMS, filter)) {
         let stems = stems_of_found(&found.matching, &reference, &detected, &stems);
@@ -139,6 +135,14 @@ fn add_trees(
     }
     report.trees = Some(found);
     Ok(())
+}
+
+fn match_params(args: &Args) -> MatchParams {
+    MatchParams {
+        max_distance_m: args.distance,
+        max_height_difference_m: args.height_difference,
+        rule: if args.optimal { MatchRule::Optimal } else { MatchRule::TallestFirst },
+    }
 }
 
 /// How far from the stem each method of fitting puts the crowns of the run, the run's own positions
@@ -164,11 +168,11 @@ fn positions(
     };
     let settings = plan::side_by_side(params.prior_half_width_m);
     let found = compare(&clusters, &settings, params.cell_m, &|| ())?;
-    let of_method = |one: &timberline_experiment::crowns::Comparison| MethodErrors {
+    let of_method = |one: &Comparison| MethodErrors {
         method: one.setting.to_string(),
         without_surface: (!one.setting.sees_points())
             .then(|| one.outcomes.iter().filter(|outcome| !outcome.is_usable()).count()),
-        errors: ErrorStats::of(one.outcomes.iter().map(|outcome| outcome.error_m())),
+        errors: ErrorStats::of(one.outcomes.iter().map(Outcome::error_m)),
     };
     Ok(std::iter::once(run).chain(found.iter().map(of_method)).collect())
 }

@@ -46,6 +46,7 @@ enum What {
 )]
 struct Crowns {
     /// Pipeline file, with --campaign [default: that of the last run]
+    #[arg(requires = "campaign")]
     pipeline: Option<PathBuf>,
     /// Folder of a campaign with a finished run and known trees
     #[arg(long, value_name = "DIR")]
@@ -201,11 +202,14 @@ fn bar(crowns: u64) -> ProgressBar {
     bar
 }
 
+/// The end of the report.
+const FIGURE: &str = "\n## Figure\n\n![Median error over omega and over delta](figure4.png)\n";
+
 fn write(folder: &Path, all: &[Assessed], cells_m: &[f64], json: &serde_json::Value) -> Result<()> {
     std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
     let json = serde_json::to_string_pretty(json)? + "\n";
     let files = [
-        ("report.md", text::markdown(all, cells_m)),
+        ("report.md", text::markdown(all, cells_m) + FIGURE),
         ("methods.csv", text::methods_csv(all)),
         ("trees.csv", text::trees_csv(all)),
         ("clusters.csv", text::clusters_csv(all)),

@@ -93,7 +93,7 @@ fn panel<B: DrawingBackend>(panel: &Panel, area: &Area<B>) -> Result<(), Failure
     let mut plane = ChartBuilder::on(area)
         .caption(&panel.title, bold(LABEL_PX + 2.0))
         .margin(20)
-        .margin_right(36)
+        .margin_right(56)
         .x_label_area_size(94)
         .y_label_area_size(124)
         .build_cartesian_2d(x.range[0]..x.range[1], y.range[0]..y.range[1])?;

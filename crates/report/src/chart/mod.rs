@@ -1,7 +1,7 @@
 //! Charts of curves in panels side by side, as PNG and as SVG.
 //!
 //! Axes, grids and curves are laid out by the plotters library; the PNG is painted on a
-//! [`Canvas`](crate::Canvas), with its smooth lines and the fonts that come with the program, so that
+//! [`Canvas`], with its smooth lines and the fonts that come with the program, so that
 //! no font or library of the system is needed and the picture is the same everywhere.
 //!
 //! ```
