@@ -1,10 +1,11 @@
 //! Generated datasets in the manner of the paper's: what they are made of.
 //!
 //! Polewski et al. tested on two: I, Norway spruce with clean segments, and II, Douglas fir with the
-//! errors of an automatic segmentation. Neither is public. The generated ones agree with what the
+//! errors of an automatic segmentation. Neither is public. The generated ones are near what the
 //! paper's Table 1 says (number of trees, height, radius of the smallest circle around a segment,
 //! density of points) and are virtual otherwise: crowns are envelopes filled with foliage, stems are
-//! straight, and errors of segments come from the rates below.
+//! straight, and errors of segments come from the rates below. How the rates were set is told in
+//! [`super::paper::DIFFERENCES`].
 
 use super::cluster::Cluster;
 use super::plot::plot;
