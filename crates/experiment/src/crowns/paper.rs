@@ -73,9 +73,9 @@ pub const DIFFERENCES: &[&str] = &[
     "The rates of datasets I and II were set by hand, in about eight rounds on small sets and on seed 1, until height, radius and \
      density were near the paper's Table 1 and the errors of hull centroid and highest point near its section 6. \
      The errors of the fits were in view all along, and they had a part in the last rounds for dataset II: fewer merged segments \
-     (40 instead of 50 %), because L1 and L2 were worse than in the paper, and more noise of the sensor with less lean of the \\
-     stems (0.11 instead of 0.06 m, 0.3 instead of 0.45 degrees), because with them the prior gains more over the highest point. So that the sizes of the errors are like the \
-     paper's is no confirmation of it; the order of the methods and the course of the curves are what can be compared. Seeds \
+     (40 instead of 50 %), because L1 and L2 were worse than in the paper, and more noise of the sensor with less lean of the \
+     stems (0.11 instead of 0.06 m, 0.3 instead of 0.45 degrees), because with \
+     them the prior gains more over the highest point. That the sizes of the errors are like the paper's is no confirmation of it; the order of the methods and the course of the curves are what can be compared. Seeds \
      other than 1 had no part in it.",
     "How much of the error of a highest point is lean, a new leader or noise is not known and was chosen. The narrow lead of L1 \
      with a prior over the highest point on dataset II depends on it: with the rates before the last rounds it was 0.253 against \
