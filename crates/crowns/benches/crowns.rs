@@ -4,14 +4,13 @@
 #[path = "../tests/common/mod.rs"]
 mod common;
 
-use common::{normal, stand, window};
+use common::problems::{Case, Wishes};
+use common::{stand, window};
 use criterion::{BenchmarkId, Criterion, criterion_group, criterion_main};
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::SeedableRng;
 use std::hint::black_box;
-use timberline_crowns::params::{Method, ShapeChoice};
+use timberline_crowns::params::{Method as Consensus, ShapeChoice};
 use timberline_crowns::starsac::fit_window;
-use timberline_crowns::surface::{AxisBounds, EqualAxis, Paraboloid, Prior, Problem, Shape, fit};
+use timberline_crowns::surface::{Engine, Method};
 use timberline_crowns::{CrownModelParams, Window};
 
 /// Windows of 20 m around simulated trees.
@@ -31,7 +30,7 @@ fn starsac(criterion: &mut Criterion) {
         (
             "exact best of three",
             CrownModelParams {
-                method: Method::Exact,
+                method: Consensus::Exact,
                 shape: ShapeChoice::Best,
                 ..CrownModelParams::default()
             },
@@ -57,39 +56,35 @@ fn gathering(criterion: &mut Criterion) {
     });
 }
 
-/// `count` cells in a disc over a noisy paraboloid.
-fn cells(count: usize) -> Vec<[f64; 3]> {
-    let truth = Paraboloid::from_shape(&Shape {
-        centre: [0.2, -0.1],
-        apex_z_m: 20.0,
-        semiaxes_m: [0.9; 2],
-        azimuth: 0.0,
-    });
-    let mut random = ChaCha8Rng::seed_from_u64(count as u64);
-    let radius = 0.5 * (count as f64 / std::f64::consts::PI).sqrt();
-    (0..count)
-        .map(|i| {
-            let (sin, cos) = libm::sincos(2.4 * i as f64);
-            let r = radius * (i as f64 / count as f64).sqrt();
-            let cell = |v: f64| (v / 0.5).floor() * 0.5 + 0.25;
-            let (x, y) = (cell(r * cos), cell(r * sin));
-            [x, y, truth.z(x, y) + 0.3 * normal(&mut random)]
-        })
-        .collect()
+/// Crowns as the tests generate them, without weights.
+fn cases(count: usize, omega: f64, prior: bool) -> Vec<Case> {
+    let priors = f64::from(u8::from(prior));
+    let wishes = Wishes { cells: [count, count], omegas: vec![omega], priors, weights: 0.0 };
+    (0..50).map(|seed| Case::random(seed, &wishes)).collect()
 }
 
 fn surface(criterion: &mut Criterion) {
-    let mut group = criterion.benchmark_group("L1 paraboloid");
-    for count in [30, 100, 300, 1000] {
-        let cells = cells(count);
-        let problem = Problem {
-            cells: &cells,
-            axes: AxisBounds { largest_m: 3.0, smallest_m: 0.1 },
-            prior: Some(Prior { centre: [0.0; 2], half_width_m: 0.5 }),
-        };
-        group.bench_function(BenchmarkId::new("equal axes, cells", count), |bench| {
-            bench.iter(|| fit(black_box(&problem), &EqualAxis));
-        });
+    let mut group = criterion.benchmark_group("L1 paraboloid, cells");
+    let kinds = [
+        ("linear program", 0.0, None),
+        ("omega 0.2", 0.2, None),
+        ("omega 0.2, prior", 0.2, Some(0.1)),
+        ("omega 0.2, fixed centre", 0.2, Some(0.0)),
+    ];
+    for (name, omega, half_width_m) in kinds {
+        for count in [30, 100, 300, 1000] {
+            let mut cases = cases(count, omega, half_width_m.is_some());
+            for prior in cases.iter_mut().filter_map(|case| case.prior.as_mut()) {
+                prior.half_width_m = half_width_m.unwrap_or(0.0);
+            }
+            let mut next = cases.iter().cycle();
+            group.bench_function(BenchmarkId::new(name, count), |bench| {
+                bench.iter(|| {
+                    let case = next.next()?;
+                    case.method(Engine::Dedicated).fit(black_box(&case.problem())).ok()
+                });
+            });
+        }
     }
     group.finish();
 }

@@ -3,6 +3,12 @@
 //! The environment variable `TIMBERLINE_ORACLE` names a Python interpreter that has the packages of
 //! `.ci/requirements.txt`.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    reason = "a test may stop at what it did not expect"
+)]
+
 use super::problems::Case;
 use serde::Deserialize;
 use std::path::Path;
