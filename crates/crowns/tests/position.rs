@@ -9,7 +9,7 @@ mod common;
 
 use common::{stand, window};
 use timberline_crowns::starsac;
-use timberline_crowns::surface::{AxisBounds, EqualAxis, Prior, Problem, fit, thin};
+use timberline_crowns::surface::{AxisBounds, L1, Method, Prior, Problem, thin};
 use timberline_crowns::{CrownFitParams, CrownModelParams};
 
 /// Median distance to the axis of the highest echo, and of the fit for each half width.
@@ -27,11 +27,12 @@ fn medians(per_m2: f64, half_widths: &[Option<f64>]) -> (f64, Vec<f64>) {
         highest.push(libm::hypot(apex[0] - truth.apex[0], apex[1] - truth.apex[1]));
         for (width, off) in half_widths.iter().zip(&mut fitted) {
             let prior = width.map(|half_width_m| Prior { centre: [0.0; 2], half_width_m });
-            let axes = AxisBounds {
+            let bounds = AxisBounds::Exact {
                 largest_m: defaults.largest_axis_m,
                 smallest_m: defaults.smallest_axis_m,
             };
-            let [x, y] = fit(&Problem { cells: &cells, axes, prior }, &EqualAxis).unwrap().position;
+            let problem = Problem { prior, ..Problem::new(&cells) };
+            let [x, y] = L1 { bounds, ..L1::equal_axes() }.fit(&problem).unwrap().position;
             off.push(libm::hypot(apex[0] + x - truth.apex[0], apex[1] + y - truth.apex[1]));
         }
     }
