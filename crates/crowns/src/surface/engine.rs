@@ -27,4 +27,12 @@ impl Engine {
         // Rounding can stop a solver of few unknowns where a general one still gets through.
         interior::solve(program).or_else(|_| clarabel::solve(program))
     }
+
+    /// A bound and the surface near it, without the last digits of the surface.
+    pub(super) fn relax<const K: usize>(self, program: &Program<K>) -> Result<Optimum<K>, Error> {
+        match self {
+            Self::Clarabel => clarabel::solve(program),
+            Self::Dedicated => interior::relax(program).or_else(|_| clarabel::solve(program)),
+        }
+    }
 }

@@ -127,7 +127,7 @@ impl<'a> Profiler<'a> {
         let at = [0, 1].map(|axis| centre[axis] + distance * ray.direction[axis]);
         if method.omega > 0.0 {
             let program = formulate::elliptic_fixed(&scaled.cells, &scaled.limits, at);
-            let objective = method.engine.solve(&program)?.objective;
+            let objective = method.engine.relax(&program)?.objective;
             return Ok(Profile { objective, slope: None });
         }
         if method.engine == Engine::Dedicated

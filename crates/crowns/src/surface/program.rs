@@ -59,6 +59,8 @@ pub(super) struct Program<const K: usize> {
     pub(super) spread: [f64; K],
     /// Size that no unknown can exceed in any case.
     pub(super) cap: [f64; K],
+    /// Where to begin, well inside the cones; without, near least squares.
+    pub(super) start: Option<[f64; K]>,
 }
 
 /// What an engine returns.
@@ -75,7 +77,7 @@ impl<const K: usize> Program<K> {
     /// A program whose rows determine all unknowns.
     pub(super) fn new(rows: Vec<Row<K>>, cones: Vec<Cone<K>>) -> Self {
         let spread = gram_spread(&rows);
-        Self { rows, cones, spread, cap: [f64::INFINITY; K] }
+        Self { rows, cones, spread, cap: [f64::INFINITY; K], start: None }
     }
 
     pub(super) fn objective(&self, x: &[f64; K]) -> f64 {

@@ -23,7 +23,7 @@ pub(super) fn crown(seed: u64, bounds: AxisBounds, omega: f64) -> Scaled {
             let (dx, dy) = (x - x0, y - y0);
             let fall = a * dx * dx + b * dy * dy + c * dx * dy + draw(-0.3, 0.3);
             let z = if draw(0.0, 1.0) < share { draw(-12.0, 0.0) } else { -fall };
-            [x, y, z, if seed % 3 == 0 { draw(0.5, 2.0) } else { 1.0 }]
+            [x, y, z, if seed.is_multiple_of(3) { draw(0.5, 2.0) } else { 1.0 }]
         })
         .collect();
     Scaled::new(&cells, Limits::new(bounds, omega).unwrap())

@@ -17,8 +17,8 @@ use super::program::{Cone, Optimum, Program, Row};
 use super::scale::{Apex, Scaled};
 use crate::Error;
 
-/// Gap, relative to the objective, at which the search ends: half of what is promised.
-const GAP: f64 = 5e-7;
+/// Gap, relative to the objective, at which the search ends: two searches agree to 1e-7.
+const GAP: f64 = 5e-8;
 /// The same relative to the heights, for surfaces that fit exactly.
 const GAP_OF_HEIGHTS: f64 = 1e-12;
 /// Pieces after which the search ends in any case, with the gap that is left.
@@ -60,6 +60,8 @@ struct Side {
     cells: Vec<Cell>,
     /// Largest sizes of the unknowns; see [`Program::spread`].
     spread: [f64; 8],
+    /// Shape of the free optimum along, across and mixed, and its place along the edge.
+    free: ([f64; 3], f64),
 }
 
 struct Search<'a> {
@@ -90,7 +92,7 @@ pub(super) fn boundary(
     let mut search = Search {
         engine,
         scaled,
-        sides: kept.iter().map(|edge| Side::new(*edge, &scaled.cells)).collect(),
+        sides: kept.iter().map(|edge| Side::new(*edge, &scaled.cells, &free.surface)).collect(),
         ratio: imbalance / (1.0 - imbalance * imbalance).sqrt(),
         best: Found { objective: f64::INFINITY, ..*free },
         open: Vec::new(),
@@ -126,7 +128,7 @@ fn leaves_inwards(edge: &Edge, free: &Apex, omega: f64) -> bool {
 }
 
 impl Side {
-    fn new(edge: Edge, cells: &[Cell]) -> Self {
+    fn new(edge: Edge, cells: &[Cell], free: &Apex) -> Self {
         let turned =
             |cell: &Cell| [cell[edge.axis], cell[1 - edge.axis] - edge.place, cell[2], cell[3]];
         let cells: Vec<Cell> = cells.iter().map(turned).collect();
@@ -135,7 +137,21 @@ impl Side {
         let [s0, s1, .., s5] = gram_spread(&rows);
         // The two shapes of a hull have curvatures of one sign, and |phi2| <= |phi0 + phi1|.
         let s2 = s0 + s1;
-        Self { edge, cells, spread: [s0, s1, s2, s0, s1, s2, s5, f64::INFINITY] }
+        let [p0, p1, p2] = free.curvature;
+        let shape = if edge.axis == 0 { [p0, p1, p2] } else { [p1, p0, p2] };
+        let spread = [s0, s1, s2, s0, s1, s2, s5, f64::INFINITY];
+        Self { edge, cells, spread, free: (shape, free.centre[edge.axis]) }
+    }
+
+    /// Mean of what a shape about a place on the edge leaves of the heights.
+    fn mean_top(&self, [p0, p1, p2]: [f64; 3], at: f64) -> f64 {
+        let (mut sum, mut weight) = (0.0, 0.0);
+        for &[x, y, z, w] in &self.cells {
+            let dx = x - at;
+            sum += w * (z - p0 * dx * dx - p1 * y * y - p2 * dx * y);
+            weight += w;
+        }
+        sum / weight
     }
 
     /// A surface along and across the edge as one along the axes.
@@ -155,7 +171,7 @@ impl Piece {
     /// where P is. The hull of {(P, b)} over a segment is therefore made of two shapes, one for each
     /// end: P = P1 + P2, b = 2 P1 c1 + 2 P2 c2, with P1 in lambda times and P2 in 1 - lambda times the
     /// set of allowed shapes. Unknowns: phi0, phi1, phi2 of both, the constant, lambda.
-    fn program(&self, side: &Side, limits: &Limits) -> Program<8> {
+    fn program(&self, side: &Side, limits: &Limits, ratio: f64) -> Program<8> {
         let [t1, t2] = self.along;
         let row = |&[x, y, z, w]: &Cell| {
             let shape = |t: f64| [x * x - 2.0 * t * x, y * y, x * y - t * y];
@@ -173,13 +189,37 @@ impl Piece {
                 whole,
             };
             cones.extend(form.cones(limits));
-            cones.push(ratio_cone(first, self.ratio[0], 1.0));
-            cones.push(ratio_cone(first, self.ratio[1], -1.0));
-            cones.push(Cone::linear(form.share, whole));
+            // The limits on the shape imply the outermost ratios, those on its axes a share above 0.
+            for (limit, sign) in self.ratio.into_iter().zip([1.0, -1.0]) {
+                if limit.abs() < ratio {
+                    cones.push(ratio_cone(first, limit, sign));
+                }
+            }
+            if limits.mu > 0.0 {
+                cones.push(Cone::linear(form.share, whole));
+            }
         }
         let mut cap = [f64::INFINITY; 8];
         cap[7] = 1.0;
-        Program { rows: side.cells.iter().map(row).collect(), cones, spread: side.spread, cap }
+        let rows = side.cells.iter().map(row).collect();
+        Program { rows, cones, spread: side.spread, cap, start: Some(self.start(side)) }
+    }
+
+    /// The free optimum brought well into the piece.
+    fn start(&self, side: &Side) -> [f64; 8] {
+        let within = |value: f64, [low, high]: [f64; 2]| {
+            let margin = LEAST_SHARE * (high - low);
+            value.clamp(low + margin, high - margin)
+        };
+        let ([p0, p1, p2], place) = side.free;
+        let shape = [p0, p1, 2.0 * p0 * within(0.5 * p2 / p0, self.ratio)];
+        let at = within(place, self.along);
+        let [t1, t2] = self.along;
+        let share = (t2 - at) / (t2 - t1);
+        let constant = side.mean_top(shape, at) + shape[0] * at * at;
+        let [a, b, c] = shape.map(|value| share * value);
+        let [d, e, f] = shape.map(|value| (1.0 - share) * value);
+        [a, b, c, d, e, f, constant, share]
     }
 
     /// The two parts of a piece, divided where the best surface of its hull is.
@@ -238,7 +278,7 @@ impl Search<'_> {
     /// Bounds a piece and takes from it a surface whose centre is in it.
     fn look(&mut self, piece: Piece) -> Result<(), Error> {
         let side = &self.sides[piece.edge];
-        let optimum = self.engine.solve(&piece.program(side, &self.scaled.limits))?;
+        let optimum = self.engine.relax(&piece.program(side, &self.scaled.limits, self.ratio))?;
         self.best.nodes += 1;
         self.best.iterations += optimum.iterations;
         let (surface, at) = self.surface(&piece, &optimum);

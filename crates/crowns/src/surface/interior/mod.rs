@@ -64,9 +64,23 @@ struct State<'a, const K: usize> {
     gap: f64,
 }
 
+/// The optimum to the last digits.
 pub(super) fn solve<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, Error> {
+    let (mut state, iterations) = iterate(program, GAP);
+    polish::polish(&mut state);
+    state.finish(iterations, ACCEPTABLE_GAP)
+}
+
+/// A surface and a bound that are near enough to one another for branch and bound.
+pub(super) fn relax<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, Error> {
+    let (state, iterations) = iterate(program, ACCEPTABLE_GAP);
+    state.finish(iterations, 10.0 * ACCEPTABLE_GAP)
+}
+
+fn iterate<const K: usize>(program: &Program<K>, gap: f64) -> (State<'_, K>, u32) {
     let mut state = State::start(program);
-    let tolerance = |objective: f64| GAP * objective + GAP_OF_HEIGHTS * program.magnitude();
+    let heights = GAP_OF_HEIGHTS * program.magnitude();
+    let tolerance = |objective: f64| gap * objective + heights;
     let mut iterations = 0;
     while iterations < MAX_ITERATIONS {
         state.measure();
@@ -82,14 +96,13 @@ pub(super) fn solve<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, 
         }
     }
     state.measure();
-    polish::polish(&mut state);
-    state.finish(iterations)
+    (state, iterations)
 }
 
 impl<'a, const K: usize> State<'a, K> {
     /// A well-centred point with residuals of least squares.
     fn start(program: &'a Program<K>) -> Self {
-        let x = ridge(program);
+        let x = program.start.unwrap_or_else(|| ridge(program));
         let weight: f64 = program.rows.iter().map(|row| row.w).sum();
         let mean = (program.objective(&x) / weight).max(1e-3);
         let lanes = program.rows.iter().map(|row| {
@@ -177,7 +190,7 @@ impl<'a, const K: usize> State<'a, K> {
         [primal, dual]
     }
 
-    fn finish(mut self, iterations: u32) -> Result<Optimum<K>, Error> {
+    fn finish(mut self, iterations: u32, acceptable: f64) -> Result<Optimum<K>, Error> {
         self.measure();
         let y = self.lanes.iter().map(|lane| lane.y).collect();
         let s = self.links.iter().map(|link| link.s).collect();
@@ -186,7 +199,7 @@ impl<'a, const K: usize> State<'a, K> {
         let feasible = self.links.iter().all(|link| {
             link.residue.iter().all(|residue| residue.abs() <= 1e-7 * (1.0 + link.kappa[0]))
         });
-        if feasible && self.objective - lower_bound <= ACCEPTABLE_GAP * size {
+        if feasible && self.objective - lower_bound <= acceptable * size {
             let objective = self.objective;
             return Ok(Optimum { x: self.x, objective, lower_bound, iterations });
         }
