@@ -29,10 +29,7 @@ impl Dual {
         for (cone, s) in program.cones.iter().zip(&self.s) {
             value -= (0..cone.dim).map(|i| cone.shift[i] * s[i]).sum::<f64>();
         }
-        let reach = level + program.magnitude();
-        let largest = |k: usize| (program.spread[k] * reach).min(program.cap[k]);
-        let open = (0..K).filter(|&k| rho[k] != 0.0).map(|k| rho[k].abs() * largest(k));
-        value - open.sum::<f64>()
+        value - program.charge(&rho, level, program.magnitude())
     }
 
     /// D'y - G's.

@@ -7,7 +7,9 @@ use crate::Error;
 /// Who solves the convex programs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Engine {
-    /// Vertex descent for linear programs, an interior point method of few unknowns for the others.
+    /// Vertex descent for linear programs, an interior point method of few unknowns for the others;
+    /// where rounding stops that short of the promised gap (some pieces of the search in a prior box,
+    /// nothing else so far), Clarabel takes the program over.
     #[default]
     Dedicated,
     /// The general cone solver Clarabel, as a reference: slower by one to two orders of magnitude.

@@ -89,6 +89,13 @@ impl<const K: usize> Program<K> {
         self.rows.iter().map(|row| row.w * row.z.abs()).sum()
     }
 
+    /// How much a residue of the dual equations can matter: the most that `rho x` can be in size while
+    /// the objective of `x` is not above `level`, `magnitude` being [`Self::magnitude`].
+    pub(super) fn charge(&self, rho: &[f64; K], level: f64, magnitude: f64) -> f64 {
+        let largest = |k: usize| (self.spread[k] * (level + magnitude)).min(self.cap[k]);
+        (0..K).filter(|&k| rho[k] != 0.0).map(|k| rho[k].abs() * largest(k)).sum()
+    }
+
     /// Whether all constraints are linear.
     pub(super) fn is_linear(&self) -> bool {
         self.cones.iter().all(|cone| cone.dim == 1)

@@ -36,10 +36,7 @@ impl<const K: usize> Descent<'_, K> {
                 add(&self.normal(item), self.level(item), multiplier.min(0.0));
             }
         }
-        let reach = objective + magnitude;
-        let largest = |k: usize| (self.program.spread[k] * reach).min(self.program.cap[k]);
-        let open = (0..K).filter(|&k| rho[k] != 0.0).map(|k| rho[k].abs() * largest(k));
-        let lower_bound = (value - open.sum::<f64>()).min(objective);
+        let lower_bound = (value - self.program.charge(&rho, objective, magnitude)).min(objective);
         Certificate { objective, lower_bound, magnitude }
     }
 }

@@ -46,7 +46,7 @@ pub(super) fn nearest<const K: usize>(
 fn most_violated<const K: usize>(t: &[f64; K], halves: &[Half<K>]) -> Option<usize> {
     let mut worst = (0.0, None);
     for (place, half) in halves.iter().enumerate() {
-        let value = dot(&half.normal, t) + half.shift;
+        let value = half.value(t);
         let square = dot(&half.normal, &half.normal);
         if value < -half.tiny && value * value > worst.0 * square {
             worst = (value * value / square, Some(place));
@@ -70,7 +70,7 @@ impl<const K: usize> Active<K> {
         for _ in 0..=K {
             let (shares, direction) = self.project(halves, &own);
             let gain = dot(&direction, &normal);
-            let open = -(dot(&normal, t) + halves[new].shift);
+            let open = -halves[new].value(t);
             let full = gain > ROUNDING * dot(&own, &normal) && self.halves.len() < K;
             let far = if full { open / gain } else { f64::INFINITY };
             let first = self.first_to_leave(&shares);
