@@ -145,10 +145,6 @@ pub fn as_tree(tree: &FoundTree, position: Position) -> Tree {
     Tree { id: tree.id, at_m, height_m: tree.height_m, crown_diameter_m, layer: None }
 }
 
-/// Score of a label above which its point is on the crown's surface: what the stage `crown-fit`
-/// fits.
-const ON_SURFACE: f32 = 0.5;
-
 /// The crowns of a run whose stems are known: for every tree id, in world coordinates, the points on
 /// its crown's surface. Trees without such points are left out.
 ///
@@ -174,7 +170,7 @@ pub fn clusters(
             cloud.len()
         );
         let labelled = labels.tree_id.iter().zip(&labels.score).enumerate();
-        for (index, (id, _)) in labelled.filter(|(_, (_, score))| **score > ON_SURFACE) {
+        for (index, (id, _)) in labelled.filter(|(_, (_, score))| **score > Labels::ON_SURFACE) {
             if stems.contains_key(id) {
                 points.entry(*id).or_default().push(cloud.world(index));
             }

@@ -8,8 +8,14 @@ use serde::{Deserialize, Serialize};
 pub struct Labels {
     /// Tree ids; 0 for no tree.
     pub tree_id: Vec<u64>,
-    /// How sure the segmenter is, 0 to 1; above 0.5 for points on the crown's surface, 0 for no tree.
+    /// How sure the segmenter is, 0 to 1; above [`Labels::ON_SURFACE`] for points on the crown's
+    /// surface, 0 for no tree.
     pub score: Vec<f32>,
+}
+
+impl Labels {
+    /// Score above which a point is on the surface of its tree's crown.
+    pub const ON_SURFACE: f32 = 0.5;
 }
 
 table_kind!(Labels, "labels", 1, "the tree of every point of a tile");

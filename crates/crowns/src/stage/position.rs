@@ -7,11 +7,8 @@ use crate::surface::{
     Problem, StarSac, Surface, Uncertainty,
 };
 use timberline_artefact::Surroundings;
-use timberline_artefact::kinds::{PositionMethod, Tree, TreeFlag};
+use timberline_artefact::kinds::{Labels, PositionMethod, Tree, TreeFlag};
 use timberline_pointcloud::frame::quantise;
-
-/// Score of a label above which its point is on the crown's surface.
-const ON_SURFACE: f32 = 0.5;
 
 /// Semi-axes that differ by a smaller share have no direction: what is left of rounding.
 const EQUAL_AXES: f64 = 1e-9;
@@ -63,7 +60,7 @@ fn solve(
     near: &Surroundings,
     params: &CrownFitParams,
 ) -> Result<Solved, Error> {
-    let on_surface = points.iter().filter(|&&i| near.score[i as usize] > ON_SURFACE);
+    let on_surface = points.iter().filter(|&&i| near.score[i as usize] > Labels::ON_SURFACE);
     let world = on_surface.map(|&i| near.cloud.world(i as usize));
     let cells = match params.method {
         FitMethod::L1 | FitMethod::L2 => surface::thin(world, apex_m, params.cell_m)?,
