@@ -206,8 +206,8 @@ fn main() {
     }
     let crowns: Vec<Vec<[f64; 3]>> = (0..2000).map(points).collect();
     println!("\nthinning and fit with a prior of 0.5 m at the highest point\n");
-    throughput("equal axes", &crowns, 500, &L1::equal_axes(), false);
-    throughput("equal axes, uncertainty", &crowns, 20, &L1::equal_axes(), true);
+    throughput("equal axes", &crowns, 500, &L1::default(), false);
+    throughput("equal axes, uncertainty", &crowns, 20, &L1::default(), true);
     let two = L1 { omega: 0.2, ..L1::default() };
     throughput("omega 0.2", &crowns, 20, &two, false);
     throughput("omega 0.2, uncertainty", &crowns, 5, &two, true);

@@ -32,7 +32,7 @@ fn medians(per_m2: f64, half_widths: &[Option<f64>]) -> (f64, Vec<f64>) {
                 smallest_m: defaults.smallest_axis_m,
             };
             let problem = Problem { prior, ..Problem::new(&cells) };
-            let [x, y] = L1 { bounds, ..L1::equal_axes() }.fit(&problem).unwrap().position;
+            let [x, y] = L1 { bounds, ..L1::default() }.fit(&problem).unwrap().position;
             off.push(libm::hypot(apex[0] + x - truth.apex[0], apex[1] + y - truth.apex[1]));
         }
     }

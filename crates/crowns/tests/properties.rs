@@ -80,17 +80,7 @@ proptest! {
     #[test]
     fn a_turned_crown(seed in 0u64..100_000, angle in 0.0f64..6.2,
                       omega in prop::sample::select(vec![0.0, 0.2, 0.5])) {
-        let (sin, cos) = libm::sincos(angle);
-        for priors in [0.0, 1.0] {
-            // The prior is a box: it turns with the crown only where it is a point.
-            let mut case = crown(seed, omega, priors);
-            case.prior = case.prior.map(|prior| Prior { half_width_m: 0.0, ..prior });
-            let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
-            let turned = mapped(&case, turn);
-            let [x, y] = fit(&case).position;
-            let [x, y, _] = turn([x, y, 0.0]);
-            same(&case, [x, y], 1.0, &turned, true);
-        }
+        check_turned(seed, angle, omega);
     }
 
     #[test]
@@ -180,7 +170,24 @@ proptest! {
     }
 }
 
+/// Turns a crown; it must turn with its data.
+fn check_turned(seed: u64, angle: f64, omega: f64) {
+    let (sin, cos) = libm::sincos(angle);
+    for priors in [0.0, 1.0] {
+        // The prior is a box: it turns with the crown only where it is a point.
+        let mut case = crown(seed, omega, priors);
+        case.prior = case.prior.map(|prior| Prior { half_width_m: 0.0, ..prior });
+        let turn = |[x, y, z]: [f64; 3]| [cos * x - sin * y, sin * x + cos * y, z];
+        let turned = mapped(&case, turn);
+        let [x, y] = fit(&case).position;
+        let [x, y, _] = turn([x, y, 0.0]);
+        same(&case, [x, y], 1.0, &turned, true);
+    }
+}
+
+/// One residual is nought only just: at a gap of 1e-10 it could not be told, and the centre of so
+/// flat a surface, 15 m off, was 6e-9 m from where it belongs.
 #[test]
-fn the_default_method_is_the_one_with_equal_axes() {
-    assert_eq!(L1::default(), L1::equal_axes());
+fn a_turned_crown_with_a_residual_that_is_hardly_active() {
+    (0..40).for_each(|step| check_turned(43391, 0.155 * f64::from(step), 0.5));
 }

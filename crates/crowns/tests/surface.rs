@@ -16,7 +16,7 @@ fn uniform(random: &mut ChaCha8Rng) -> f64 {
 }
 
 fn solve(cells: &[[f64; 3]], prior: Option<Prior>) -> Fit {
-    solve_with(&L1::equal_axes(), cells, prior)
+    solve_with(&L1::default(), cells, prior)
 }
 
 fn solve_with(method: &L1, cells: &[[f64; 3]], prior: Option<Prior>) -> Fit {

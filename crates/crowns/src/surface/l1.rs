@@ -75,12 +75,6 @@ impl Method for L1 {
 }
 
 impl L1 {
-    /// The model with equal axes and default bounds.
-    #[must_use]
-    pub fn equal_axes() -> Self {
-        Self::default()
-    }
-
     fn is_determined(&self, cells: &[Cell]) -> bool {
         if self.omega == 0.0 {
             determines(cells, equal_row)

@@ -18,6 +18,10 @@ use step::Step;
 
 /// Gap between primal and dual, relative to the objective, that ends the iteration.
 const GAP: f64 = 1e-10;
+/// The same where it is not clear at that gap which residuals are nought.
+const LAST_GAP: f64 = 1e-14;
+/// Steps it may take to get there.
+const MAX_LAST_ITERATIONS: u32 = 4;
 /// The same relative to the heights, for surfaces that fit exactly.
 const GAP_OF_HEIGHTS: f64 = 1e-13;
 /// Residue of the equations that is as good as none.
@@ -66,37 +70,21 @@ struct State<'a, const K: usize> {
 
 /// The optimum to the last digits.
 pub(super) fn solve<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, Error> {
-    let (mut state, iterations) = iterate(program, GAP);
-    polish::polish(&mut state);
+    let mut state = State::start(program);
+    let mut iterations = state.iterate(GAP, MAX_ITERATIONS);
+    if !polish::polish(&mut state) {
+        // Not yet clear which residuals are nought and which cones are active.
+        iterations += state.iterate(LAST_GAP, MAX_LAST_ITERATIONS);
+        polish::polish(&mut state);
+    }
     state.finish(iterations, ACCEPTABLE_GAP)
 }
 
 /// A surface and a bound that are near enough to one another for branch and bound.
 pub(super) fn relax<const K: usize>(program: &Program<K>) -> Result<Optimum<K>, Error> {
-    let (state, iterations) = iterate(program, ACCEPTABLE_GAP);
-    state.finish(iterations, 10.0 * ACCEPTABLE_GAP)
-}
-
-fn iterate<const K: usize>(program: &Program<K>, gap: f64) -> (State<'_, K>, u32) {
     let mut state = State::start(program);
-    let heights = GAP_OF_HEIGHTS * program.magnitude();
-    let tolerance = |objective: f64| gap * objective + heights;
-    let mut iterations = 0;
-    while iterations < MAX_ITERATIONS {
-        state.measure();
-        let residue = state.residue();
-        if state.gap <= tolerance(state.objective) && residue <= RESIDUE {
-            break;
-        }
-        iterations += 1;
-        let Some(step) = Step::of(&state) else { break };
-        let lengths = state.advance(&step);
-        if lengths[0].max(lengths[1]) < 1e-6 {
-            break;
-        }
-    }
-    state.measure();
-    (state, iterations)
+    let iterations = state.iterate(ACCEPTABLE_GAP, MAX_ITERATIONS);
+    state.finish(iterations, 10.0 * ACCEPTABLE_GAP)
 }
 
 impl<'a, const K: usize> State<'a, K> {
@@ -131,6 +119,26 @@ impl<'a, const K: usize> State<'a, K> {
         }
     }
 
+    /// Goes on until primal and dual agree to a relative gap; returns the number of steps.
+    fn iterate(&mut self, gap: f64, most: u32) -> u32 {
+        let heights = GAP_OF_HEIGHTS * self.program.magnitude();
+        let weight: f64 = self.program.rows.iter().map(|row| row.w).sum();
+        for iterations in 0..most {
+            self.measure();
+            if self.gap <= gap * self.objective + heights && self.residue(weight) <= RESIDUE {
+                return iterations;
+            }
+            let Some(step) = Step::of(self) else { return iterations };
+            let lengths = self.advance(&step);
+            if lengths[0].max(lengths[1]) < 1e-6 {
+                self.measure();
+                return iterations + 1;
+            }
+        }
+        self.measure();
+        most
+    }
+
     /// Brings residuals, residues, objective and gap up to date.
     fn measure(&mut self) {
         let (mut objective, mut gap, mut dual) = (0.0, 0.0, [0.0; K]);
@@ -154,10 +162,10 @@ impl<'a, const K: usize> State<'a, K> {
         (self.objective, self.gap, self.dual_residue) = (objective, gap, dual);
     }
 
-    /// The largest residue of any equation, relative to what it is made of.
-    fn residue(&self) -> f64 {
+    /// The largest residue of any equation, relative to what it is made of; of the sum of all
+    /// weights where it is one of forces.
+    fn residue(&self, weight: f64) -> f64 {
         let of = |value: f64, size: f64| value.abs() / (1.0 + size);
-        let weight: f64 = self.program.rows.iter().map(|row| row.w).sum();
         let dual = self.dual_residue.iter().map(|rho| of(*rho, weight));
         let cones = self
             .links

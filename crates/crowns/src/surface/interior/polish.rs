@@ -1,8 +1,8 @@
 //! The last digits: Newton's method on the conditions of optimality, once the iteration has told
 //! which residuals are nought and which cones are active.
 //!
-//! Where the optimum is a corner the iteration finds it to rounding by itself; where it lies on a
-//! curved cone the centre would only be as good as the root of the gap.
+//! Where the optimum is a corner this solves its equations; where it lies on a curved cone the
+//! centre would otherwise only be as good as the root of the gap.
 
 use super::scaling::{Vec4, determinant, product};
 use super::{Lane, Link, State};
@@ -30,7 +30,7 @@ struct Active {
 pub(super) fn polish<const K: usize>(state: &mut State<'_, K>) -> bool {
     let mut active = Active::of(state);
     let count = active.rows.len() + active.cones.len();
-    if count > K || active.cones.is_empty() {
+    if count > K || (active.cones.is_empty() && count < K) {
         return false;
     }
     let mut x = state.x;
