@@ -9,7 +9,7 @@ use proptest::prelude::*;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::SeedableRng;
 use timberline_crowns::surface::{
-    Axes, AxisBounds, Engine, Fit, L1, L2, Method, Paraboloid, Prior, Problem, Shape,
+    Axes, AxisBounds, Engine, Fit, L2, Method, Paraboloid, Prior, Problem, Shape,
 };
 
 /// How far a centre may be from where the data moved it, m.
