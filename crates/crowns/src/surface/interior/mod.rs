@@ -58,6 +58,8 @@ struct Link {
 /// A point of the iteration.
 struct State<'a, const K: usize> {
     program: &'a Program<K>,
+    /// Sum of all weights.
+    weight: f64,
     x: [f64; K],
     lanes: Vec<Lane>,
     links: Vec<Link>,
@@ -110,6 +112,7 @@ impl<'a, const K: usize> State<'a, K> {
         });
         Self {
             program,
+            weight,
             x,
             lanes: lanes.collect(),
             links: links.collect(),
@@ -122,10 +125,9 @@ impl<'a, const K: usize> State<'a, K> {
     /// Goes on until primal and dual agree to a relative gap; returns the number of steps.
     fn iterate(&mut self, gap: f64, most: u32) -> u32 {
         let heights = GAP_OF_HEIGHTS * self.program.magnitude();
-        let weight: f64 = self.program.rows.iter().map(|row| row.w).sum();
         for iterations in 0..most {
             self.measure();
-            if self.gap <= gap * self.objective + heights && self.residue(weight) <= RESIDUE {
+            if self.gap <= gap * self.objective + heights && self.residue() <= RESIDUE {
                 return iterations;
             }
             let Some(step) = Step::of(self) else { return iterations };
@@ -162,11 +164,10 @@ impl<'a, const K: usize> State<'a, K> {
         (self.objective, self.gap, self.dual_residue) = (objective, gap, dual);
     }
 
-    /// The largest residue of any equation, relative to what it is made of; of the sum of all
-    /// weights where it is one of forces.
-    fn residue(&self, weight: f64) -> f64 {
+    /// The largest residue of any equation, relative to what it is made of.
+    fn residue(&self) -> f64 {
         let of = |value: f64, size: f64| value.abs() / (1.0 + size);
-        let dual = self.dual_residue.iter().map(|rho| of(*rho, weight));
+        let dual = self.dual_residue.iter().map(|rho| of(*rho, self.weight));
         let cones = self
             .links
             .iter()

@@ -56,15 +56,14 @@ pub(super) fn polish<const K: usize>(state: &mut State<'_, K>) -> bool {
 impl Active {
     /// By strict complementarity: of two numbers whose product vanishes, the one that does not.
     fn of<const K: usize>(state: &State<'_, K>) -> Self {
-        let weight: f64 = state.program.rows.iter().map(|row| row.w).sum();
-        let size = (state.objective / weight).max(1e-9);
+        let size = (state.objective / state.weight).max(1e-9);
         let zero =
             |(row, lane): (&Row<K>, &Lane)| lane.r.abs() / size < (row.w - lane.y.abs()) / row.w;
         let pairs = state.program.rows.iter().zip(&state.lanes).enumerate();
         let rows = pairs.filter(|(_, pair)| zero(*pair)).map(|(index, _)| index).collect();
         let on = |link: &Link| {
             let tail = (link.kappa[0] * link.kappa[0] - determinant(&link.kappa)).max(0.0).sqrt();
-            link.s[0] / weight > link.kappa[0] - tail
+            link.s[0] / state.weight > link.kappa[0] - tail
         };
         let factor = |(index, link): (usize, &Link)| {
             let half_line = state.program.cones[index].dim == 1;
