@@ -3,7 +3,7 @@
 use serde_json::Value;
 use std::sync::Arc;
 use timberline_artefact::stage::{DynStage, erase};
-use timberline_crowns::stage::{CrownFitStage, CrownModelStage};
+use timberline_crowns::stage::{CrownFitStage, CrownModelStage, DetectionStage};
 use timberline_export::stage::ExportStage;
 use timberline_ground::stage::{DtmStage, GroundStage};
 use timberline_ingest::stage::{Scatter, Tiles};
@@ -44,6 +44,7 @@ impl Registry {
             erase::<DtmStage>(),
             erase::<TreetopsStage>(),
             erase::<CrownModelStage>(),
+            erase::<DetectionStage>(),
             erase::<SegmentationStage>(),
             erase::<CrownFitStage>(),
             erase::<ExportStage>(),

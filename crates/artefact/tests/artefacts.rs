@@ -40,6 +40,7 @@ fn read_any(kind: &str, path: &Path) -> Result<(), Error> {
         "heights" => full::<Heights>(path),
         "treetops" => full::<Treetops>(path),
         "crown-models" => full::<CrownModels>(path),
+        "detections" => full::<Detections>(path),
         "labels" => full::<Labels>(path),
         "trees" => full::<Trees>(path),
         "outputs" => full::<Outputs>(path),
@@ -283,6 +284,7 @@ fn golden_files_of_older_versions_are_migrated_or_refused_by_name() {
     read_older::<Heights>();
     read_older::<Treetops>();
     read_older::<CrownModels>();
+    read_older::<Detections>();
     read_older::<Labels>();
     read_older::<Trees>();
     read_older::<Outputs>();

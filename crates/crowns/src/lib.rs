@@ -31,5 +31,5 @@ pub mod surface;
 pub mod window;
 
 pub use error::Error;
-pub use params::{CrownFitParams, CrownModelParams};
+pub use params::{CrownFitParams, CrownModelParams, DetectionParams};
 pub use window::Window;

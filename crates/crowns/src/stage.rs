@@ -1,11 +1,13 @@
-//! The stages `crown-models` and `crown-fit`: the only place here that reads and writes artefacts.
+//! The stages `crown-models`, `detection` and `crown-fit`: the only place here that reads and writes artefacts.
 
 mod crown_fit;
 mod crown_models;
+mod detection;
 mod position;
 
 pub use crown_fit::CrownFitStage;
 pub use crown_models::CrownModelStage;
+pub use detection::DetectionStage;
 
 /// Trees fitted between two looks at whether to stop.
 const BATCH: usize = 256;

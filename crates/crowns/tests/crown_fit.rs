@@ -96,7 +96,9 @@ fn run(params: &CrownFitParams) -> (Vec<Tree>, Vec<String>) {
     let unit = UnitId::Tile(tile);
     store.put(unit.clone(), &Labels { tree_id, score }, facts.clone()).unwrap();
     store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
-    store.put(unit.clone(), &CrownModels { models: models(&trees) }, facts).unwrap();
+    let detected = |model| Detection { model, score: 1.0, origin: Origin::Surface };
+    let trees = models(&trees).into_iter().map(detected).collect();
+    store.put(unit.clone(), &Detections { trees }, facts).unwrap();
     let path = store.run::<CrownFitStage>(unit, None, params).unwrap();
     let warnings = read_header(&path).unwrap().warnings;
     let warnings = warnings.into_iter().map(|w| format!("{}: {}", w.subject, w.message));

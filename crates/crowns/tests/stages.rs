@@ -10,8 +10,8 @@ use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::*;
 use timberline_artefact::stage::Campaign;
 use timberline_artefact::{Kind, UnitId, read, read_header, tree_id};
-use timberline_crowns::stage::{CrownFitStage, CrownModelStage};
-use timberline_crowns::{CrownFitParams, CrownModelParams};
+use timberline_crowns::stage::{CrownFitStage, CrownModelStage, DetectionStage};
+use timberline_crowns::{CrownFitParams, CrownModelParams, DetectionParams};
 use timberline_pointcloud::{Point, PointCloud, TileGrid};
 
 /// South-west corner of the stand in the world, m.
@@ -124,6 +124,8 @@ fn run_with(grid: TileGrid, threads: usize, fit: &CrownFitParams) -> Results {
             pool.install(|| store.run::<CrownModelStage>(unit.clone(), None, &params)).unwrap();
         models.extend(read::<CrownModels>(&path).unwrap().1.models);
         warnings.extend(read_header(&path).unwrap().warnings);
+        let unscored = DetectionParams { min_score: 0.0, ..DetectionParams::default() };
+        store.run::<DetectionStage>(unit.clone(), None, &unscored).unwrap();
         let path = pool.install(|| store.run::<CrownFitStage>(unit, None, fit)).unwrap();
         trees.extend(read::<Trees>(&path).unwrap().1.trees);
     }

@@ -13,8 +13,10 @@
 pub mod claim;
 pub mod error;
 pub mod params;
+pub mod segmenter;
 pub mod stage;
 
 pub use claim::{Claim, Crown, label};
 pub use error::Error;
 pub use params::{Membership, SegmentationParams};
+pub use segmenter::{Marker, Segmenter, View};

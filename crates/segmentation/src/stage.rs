@@ -1,7 +1,7 @@
 //! The stage `segmentation`: the only place here that reads and writes artefacts.
 
 use crate::{Claim, Crown, SegmentationParams, label};
-use timberline_artefact::kinds::{CrownModel, CrownModels, CrownShape, CrownStatus, Labels};
+use timberline_artefact::kinds::{CrownModel, CrownShape, CrownStatus, Detections, Labels};
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
@@ -15,7 +15,7 @@ pub struct SegmentationStage;
 impl Params for SegmentationParams {}
 
 const INPUTS: &[InputSpec] =
-    &[InputSpec::own("points"), InputSpec::own("heights"), InputSpec::halo("crown-models")];
+    &[InputSpec::own("points"), InputSpec::own("heights"), InputSpec::halo("detections")];
 
 impl Stage for SegmentationStage {
     type Params = SegmentationParams;
@@ -23,7 +23,7 @@ impl Stage for SegmentationStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "segmentation",
-            version: 1,
+            version: 2,
             summary: "The tree of every point: the crown on or below whose surface it lies",
             unit: UnitKind::Tile,
             inputs: INPUTS,
@@ -42,9 +42,9 @@ impl Stage for SegmentationStage {
     ) -> Result<(), StageError> {
         let own = gather(inputs, 0.0, &[Aligned::Height])?;
         let mut crowns = Vec::new();
-        for models in inputs.each::<CrownModels>() {
-            let (_, _, CrownModels { models }) = models?;
-            crowns.extend(models.iter().filter_map(|model| crown(model, &own.cloud.frame)));
+        for detections in inputs.each::<Detections>() {
+            let (_, _, Detections { trees }) = detections?;
+            crowns.extend(trees.iter().filter_map(|tree| crown(&tree.model, &own.cloud.frame)));
         }
         context.check_cancelled()?;
         let cloud = &own.cloud;

@@ -53,6 +53,10 @@ fn models() -> Vec<CrownModel> {
     (0..14).map(model).collect()
 }
 
+fn detected(model: CrownModel) -> Detection {
+    Detection { model, score: 1.0, origin: Origin::Surface }
+}
+
 /// Tree and score of every point by its position, over all tiles.
 fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
     let folder = tempfile::tempdir().unwrap();
@@ -64,11 +68,11 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
     for (tile, cloud, facts) in &tiles {
         let height_m = (0..cloud.len()).map(|i| (cloud.world(i)[2] - CORNER[2]) as f32).collect();
         let here = |m: &&CrownModel| grid.tile_at(m.apex_m[0], m.apex_m[1]) == *tile;
-        let mut models: Vec<CrownModel> = models.iter().filter(here).cloned().collect();
-        models.sort_by_key(|model| model.id);
+        let mut trees: Vec<Detection> = models.iter().filter(here).cloned().map(detected).collect();
+        trees.sort_by_key(|tree| tree.model.id);
         let unit = UnitId::Tile(*tile);
         store.put(unit.clone(), &Heights { height_m }, facts.clone()).unwrap();
-        store.put(unit, &CrownModels { models }, facts.clone()).unwrap();
+        store.put(unit, &Detections { trees }, facts.clone()).unwrap();
     }
     let mut labelled = BTreeMap::new();
     for (tile, cloud, _) in tiles {

@@ -8,8 +8,8 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{
-    self, CrownModels, GroundModel, GroundPoints, Heights, Labels, Outputs, PointTile, Shards,
-    Trees, Treetops,
+    self, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels, Outputs, PointTile,
+    Shards, Trees, Treetops,
 };
 use timberline_artefact::{Header, InputRef, Kind, Opened};
 
@@ -159,6 +159,7 @@ fn tables(path: &Path, header: &Header) -> Result<Vec<(String, Rows)>> {
         Heights::NAME => payload::<Heights>(path)?,
         Treetops::NAME => payload::<Treetops>(path)?,
         CrownModels::NAME => payload::<CrownModels>(path)?,
+        Detections::NAME => payload::<Detections>(path)?,
         Labels::NAME => payload::<Labels>(path)?,
         Trees::NAME => payload::<Trees>(path)?,
         Outputs::NAME => payload::<Outputs>(path)?,

@@ -4,7 +4,8 @@ use super::Usage;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{
-    CrownModel, CrownModels, GroundModel, GroundPoints, Heights, Labels, PointTile, Trees, Treetops,
+    CrownModel, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels, PointTile,
+    Trees, Treetops,
 };
 use timberline_artefact::{Header, Kind, read};
 use timberline_report::Grid;
@@ -34,6 +35,11 @@ fn draw(path: &Path, header: &Header) -> Result<Canvas> {
         Treetops::NAME => pictures::treetops(&heading, &read::<Treetops>(path)?.1.tops)?,
         CrownModels::NAME => {
             pictures::crown_models(&heading, &read::<CrownModels>(path)?.1.models)?
+        }
+        Detections::NAME => {
+            let (_, Detections { trees }) = read::<Detections>(path)?;
+            let models: Vec<CrownModel> = trees.into_iter().map(|tree| tree.model).collect();
+            pictures::crown_models(&heading, &models)?
         }
         Trees::NAME => crowns(&heading, &read::<Trees>(path)?.1)?,
         PointTile::NAME | GroundPoints::NAME | Heights::NAME | Labels::NAME => {

@@ -1,4 +1,5 @@
-//! Crown models around the treetops of a tile. Raise the version when the fields or their meaning change.
+//! Crown models around the treetops of a tile. Raise the version when the fields or their
+//! meaning change, and that of `detections`.
 
 use super::table_kind;
 use serde::{Deserialize, Serialize};

@@ -7,6 +7,7 @@
 //! stays readable. A version that is not named there is refused by name.
 
 pub mod crown_models;
+pub mod detections;
 pub mod ground_model;
 pub mod ground_points;
 pub mod heights;
@@ -25,6 +26,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 pub use crown_models::{CrownModel, CrownModels, CrownShape, CrownStatus};
+pub use detections::{Detection, Detections, Origin};
 pub use ground_model::{GroundModel, HardyPatch};
 pub use ground_points::GroundPoints;
 pub use heights::Heights;
@@ -156,6 +158,7 @@ pub fn all() -> Vec<KindInfo> {
         row::<Heights>(),
         row::<Treetops>(),
         row::<CrownModels>(),
+        row::<Detections>(),
         row::<Labels>(),
         row::<Trees>(),
         row::<Outputs>(),

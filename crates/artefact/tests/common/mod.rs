@@ -145,6 +145,8 @@ pub(crate) fn write_all(folder: &Path) -> Vec<(&'static str, PathBuf)> {
     put(&mut store, &mut paths, &Heights { height_m: vec![0.0, 1.5, f32::MAX] });
     put(&mut store, &mut paths, &Treetops { tops: vec![top] });
     put(&mut store, &mut paths, &CrownModels { models: vec![model()] });
+    let detection = Detection { model: model(), score: 0.75, origin: Origin::BelowCanopy };
+    put(&mut store, &mut paths, &Detections { trees: vec![detection] });
     put(&mut store, &mut paths, &Labels { tree_id: vec![0, 42], score: vec![0.0, 0.9] });
     put(&mut store, &mut paths, &Trees { trees: vec![tree()] });
     put(&mut store, &mut paths, &outputs());

@@ -6,7 +6,7 @@ use crate::params::CrownFitParams;
 use crate::{Error, base, edge, footprint};
 use rayon::prelude::*;
 use timberline_artefact::kinds::{
-    CrownModel, CrownModels, CrownStatus, PositionMethod, Tree, TreeFlag, Trees,
+    CrownModel, CrownStatus, Detections, PositionMethod, Tree, TreeFlag, Trees,
 };
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
@@ -29,7 +29,7 @@ const FIT_INPUTS: &[InputSpec] = &[
     InputSpec::halo("points"),
     InputSpec::halo("heights"),
     InputSpec::halo("labels"),
-    InputSpec::own("crown-models"),
+    InputSpec::own("detections"),
 ];
 
 impl Stage for CrownFitStage {
@@ -57,7 +57,8 @@ impl Stage for CrownFitStage {
     ) -> Result<(), StageError> {
         let columns = [Aligned::Height, Aligned::Label];
         let near = gather(inputs, Self::halo_m(params), &columns)?;
-        let (_, CrownModels { models }) = inputs.own()?;
+        let (_, Detections { trees }) = inputs.own()?;
+        let models: Vec<CrownModel> = trees.into_iter().map(|tree| tree.model).collect();
         check_reach(&models, params.reach_m)?;
         let grid = Grid2::new(&near.cloud.x, &near.cloud.y, GRID_CELL_M)?;
         let members = members(&near, &models);
