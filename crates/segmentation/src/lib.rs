@@ -1,22 +1,26 @@
 //! Gives every point its tree.
 //!
-//! A tree's points are those of its crown: the surface a crown model describes, and what lies
-//! below it within the crown's radius. Points are asked one by one which crown claims them best
-//! ([`claim`]), so the answer depends on the crowns around a point and on nothing else: not on the
-//! tile, nor on the sequence of points or trees.
+//! Which trees there are is known before; a [`Segmenter`] says how far each reaches. There are
+//! several ([`SegmentMethod`]), all behind one trait and none dependent on how the points are cut
+//! into tiles or in which sequence they and the trees come: [`StarSac`] asks the crown models
+//! around a point, and nothing else; the others work in squares fixed in the world ([`blocks`]).
 //!
 //! What users of a tree id expect, and get: a point of the ground, of herbs and shrubs below
 //! `min_height_m`, and of everything above or beyond the crowns has 0; a point of the canopy has
 //! the tree whose surface it lies on, also where crowns touch; a point below the canopy (inner
 //! branches, stems, understorey without a top of its own) has the tree above it.
 
+pub mod blocks;
 pub mod claim;
 pub mod error;
+pub mod methods;
 pub mod params;
 pub mod segmenter;
 pub mod stage;
 
+pub use blocks::segment_in_blocks;
 pub use claim::{Claim, Crown, label};
 pub use error::Error;
-pub use params::{Membership, SegmentationParams};
-pub use segmenter::{Marker, Segmenter, View};
+pub use methods::StarSac;
+pub use params::{Membership, SegmentMethod, SegmentationParams};
+pub use segmenter::{Marker, Piece, Segmenter, View, segmenter};

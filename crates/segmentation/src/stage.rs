@@ -1,21 +1,27 @@
 //! The stage `segmentation`: the only place here that reads and writes artefacts.
 
-use crate::{Claim, Crown, SegmentationParams, label};
-use timberline_artefact::kinds::{CrownModel, CrownShape, CrownStatus, Detections, Labels};
+use crate::blocks::{room_m, segment_in_blocks, sort_markers};
+use crate::{Claim, Crown, Marker, SegmentationParams, Segmenter, View, segmenter};
+use timberline_artefact::kinds::{
+    CrownShape, CrownStatus, Detection, Detections, Heights, Labels, PointTile,
+};
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
-use timberline_artefact::{Aligned, UnitKind, gather};
-use timberline_pointcloud::Frame;
+use timberline_artefact::{Aligned, Error, Kind, Surroundings, UnitKind, gather, read_header};
+use timberline_pointcloud::{Frame, Rect};
 
-/// The tree of every point by the crown models around it.
+/// The tree of every point, by the method that the parameters name.
 #[derive(Debug, Clone, Copy)]
 pub struct SegmentationStage;
 
 impl Params for SegmentationParams {}
 
-const INPUTS: &[InputSpec] =
-    &[InputSpec::own("points"), InputSpec::own("heights"), InputSpec::halo("detections")];
+const INPUTS: &[InputSpec] = &[
+    InputSpec::halo(PointTile::NAME),
+    InputSpec::halo(Heights::NAME),
+    InputSpec::halo(Detections::NAME),
+];
 
 impl Stage for SegmentationStage {
     type Params = SegmentationParams;
@@ -23,16 +29,18 @@ impl Stage for SegmentationStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "segmentation",
-            version: 2,
-            summary: "The tree of every point: the crown on or below whose surface it lies",
+            version: 3,
+            summary: "the tree of every point, given the trees: see `method`",
             unit: UnitKind::Tile,
             inputs: INPUTS,
-            outputs: &["labels"],
+            outputs: &[Labels::NAME],
         }
     }
 
     fn halo_m(params: &Self::Params) -> f64 {
-        params.reach_m
+        let segmenter = segmenter(params);
+        let room_m = if segmenter.is_local() { 0.0 } else { f64::from(params.block_m) };
+        segmenter.reach_m() + room_m
     }
 
     fn run(
@@ -40,35 +48,88 @@ impl Stage for SegmentationStage {
         inputs: &Inputs,
         context: &Context<'_>,
     ) -> Result<(), StageError> {
-        let own = gather(inputs, 0.0, &[Aligned::Height])?;
-        let mut crowns = Vec::new();
-        for detections in inputs.each::<Detections>() {
-            let (_, _, Detections { trees }) = detections?;
-            crowns.extend(trees.iter().filter_map(|tree| crown(&tree.model, &own.cloud.frame)));
-        }
+        let segmenter = segmenter(params);
+        let halo_m = needed_m(&*segmenter, params, &tile_rect(inputs)?);
+        let points_m = if segmenter.is_local() { 0.0 } else { halo_m };
+        let all = gather(inputs, points_m, &[Aligned::Height])?;
+        let markers = markers(inputs, &all.tile_rect.grown(halo_m), &all.cloud.frame)?;
         context.check_cancelled()?;
-        let cloud = &own.cloud;
-        let claims = label([&cloud.x, &cloud.y, &cloud.z], &own.height_m, &crowns, params)?;
-        context.advance(own.own_len as u64);
-        let claims = own.own_values(&claims);
+        let claims = claims(&*segmenter, params, &all, &markers)?;
+        context.advance(all.own_len as u64);
+        let claims = all.own_values(&claims);
         let labelled = claims.iter().filter(|claim| claim.id != 0).count();
-        let labels = labels(&claims);
-        context
-            .emit(&labels, own.located.count("points", own.own_len).count("labelled", labelled))?;
+        let facts = all.located.count("points", all.own_len).count("labelled", labelled);
+        context.emit(&labels(&claims), facts)?;
         Ok(())
     }
 }
 
-/// The crown of a model that stands.
-fn crown(model: &CrownModel, frame: &Frame) -> Option<Crown> {
-    (model.status == CrownStatus::Accepted).then(|| Crown {
+/// The tile's rectangle in the world.
+fn tile_rect(inputs: &Inputs) -> Result<Rect, Error> {
+    let path = inputs.own_path(PointTile::NAME)?;
+    let grid = read_header(path)?.facts.grid;
+    let grid = grid.ok_or_else(|| Error::corrupt(path, "header", "no tile grid"))?;
+    Ok(grid.rect(inputs.tile()?))
+}
+
+/// How far beyond this tile the segmenter looks, m; at most the halo of the stage.
+fn needed_m(segmenter: &dyn Segmenter, params: &SegmentationParams, tile: &Rect) -> f64 {
+    let reach_m = segmenter.reach_m();
+    if segmenter.is_local() { reach_m } else { room_m(tile, params.block_m, reach_m) }
+}
+
+/// The trees with an apex in a rectangle of the world, edges included.
+fn markers(inputs: &Inputs, rect: &Rect, frame: &Frame) -> Result<Vec<Marker>, Error> {
+    let mut markers = Vec::new();
+    for detections in inputs.each::<Detections>() {
+        let (_, _, Detections { trees }) = detections?;
+        let near = |tree: &&Detection| {
+            let [x, y, _] = tree.model.apex_m;
+            rect.touches(&Rect { min: [x, y], max: [x, y] })
+        };
+        markers.extend(trees.iter().filter(near).map(|tree| marker(tree, frame)));
+    }
+    sort_markers(&mut markers);
+    Ok(markers)
+}
+
+/// A tree; where its model does not stand, without a crown.
+fn marker(Detection { model, score, .. }: &Detection, frame: &Frame) -> Marker {
+    let stands = model.status == CrownStatus::Accepted;
+    let crown = Crown {
         id: model.id,
         apex: frame.local_from_world(model.apex_m),
-        coefficients: model.coefficients(),
-        radius_m: model.radius_m,
+        coefficients: if stands { model.coefficients() } else { [0.0; 2] },
+        radius_m: if stands { model.radius_m } else { 0.0 },
         tolerance_m: model.tolerance_m,
         oblique: model.shape == CrownShape::Mixed,
-    })
+    };
+    Marker { crown, height_m: model.height_m, score: *score }
+}
+
+fn claims(
+    segmenter: &dyn Segmenter,
+    params: &SegmentationParams,
+    all: &Surroundings,
+    markers: &[Marker],
+) -> Result<Vec<Claim>, crate::Error> {
+    let cloud = &all.cloud;
+    // Files that do not count returns say 0.
+    let is_first: Vec<bool> = cloud.return_number.iter().map(|number| *number <= 1).collect();
+    let view = View {
+        frame: cloud.frame,
+        x: &cloud.x,
+        y: &cloud.y,
+        z: &cloud.z,
+        height_m: &all.height_m,
+        is_first: &is_first,
+        markers,
+    };
+    if segmenter.is_local() {
+        return segmenter.segment(&view);
+    }
+    let own: Vec<bool> = all.own.iter().map(Option::is_some).collect();
+    segment_in_blocks(segmenter, &view, &own, params.block_m)
 }
 
 fn labels(claims: &[Claim]) -> Labels {

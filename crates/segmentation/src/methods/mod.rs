@@ -1,0 +1,5 @@
+//! The segmenters.
+
+pub mod starsac;
+
+pub use starsac::StarSac;
