@@ -328,7 +328,7 @@ mod architecture {
             "ctrlc",
             "tracing-subscriber",
         ];
-        let homes: [(&[&str], &[&str]); 10] = [
+        let homes: [(&[&str], &[&str]); 11] = [
             (terminal, &["xtask"]),
             (&["laz"], &["ingest"]),
             (&["las"], &["export"]),
@@ -339,7 +339,9 @@ mod architecture {
             ),
             (&["image", "plotters", "plotters-backend", "plotly", "ab_glyph"], &["report"]),
             (&["bincode", "mcap", "foxglove"], &["artefact"]),
-            (&["faer", "spade"], &["ground"]),
+            (&["faer"], &["ground"]),
+            // Surfaces through points: of the ground, and of the canopy.
+            (&["spade"], &["ground", "segmentation"]),
             (&["clarabel"], &["crowns"]),
             (&["kiddo"], &["pointcloud"]),
         ];

@@ -14,6 +14,12 @@ pub enum Error {
         /// The reach in the parameters, m.
         reach_m: f64,
     },
+    /// The triangulation refused the points.
+    #[error("triangulation of the canopy: {reason}")]
+    Triangulation {
+        /// What the library says.
+        reason: String,
+    },
     /// The points could not be laid on a grid.
     #[error(transparent)]
     Grid(#[from] timberline_pointcloud::Error),

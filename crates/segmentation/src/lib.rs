@@ -11,6 +11,7 @@
 //! branches, stems, understorey without a top of its own) has the tree above it.
 
 pub mod blocks;
+pub mod chm;
 pub mod claim;
 pub mod error;
 pub mod methods;
@@ -19,8 +20,9 @@ pub mod segmenter;
 pub mod stage;
 
 pub use blocks::segment_in_blocks;
+pub use chm::{Chm, PitFree};
 pub use claim::{Claim, Crown, label};
 pub use error::Error;
-pub use methods::StarSac;
+pub use methods::{RasterSegmenter, Seed, StarSac};
 pub use params::{Membership, SegmentMethod, SegmentationParams};
 pub use segmenter::{Marker, Piece, Segmenter, View, segmenter};

@@ -19,6 +19,12 @@ pub enum Membership {
 pub enum SegmentMethod {
     /// The crown model on or below whose surface a point lies (Tittmann et al. 2011).
     Starsac,
+    /// Marker-controlled watershed on a pit-free canopy height model (Meyer 1994; Khosravipour et al. 2014).
+    Watershed,
+    /// Region growing on a pit-free canopy height model (Dalponte and Coomes 2016).
+    Dalponte,
+    /// Voronoi cells on a pit-free canopy height model (Silva et al. 2016).
+    Silva,
 }
 
 /// Parameters of the stage `segmentation`.
@@ -34,7 +40,7 @@ pub struct SegmentationParams {
     /// surroundings; they are fixed in the world, whole metres.
     #[schemars(range(min = 8, max = 1024), extend("x-unit" = "m", "x-source" = "this program"))]
     pub block_m: u32,
-    /// For `starsac`: which points belong to a tree.
+    /// For `starsac`, and trees below the canopy with other methods: which points belong to a tree.
     #[schemars(extend("x-source" = "Tittmann et al. 2011, section 3: surface; volume: this program"))]
     pub membership: Membership,
     /// Farthest a crown can reach from its apex; a wider one is an error. Half the diagonal of the
@@ -48,6 +54,37 @@ pub struct SegmentationParams {
     /// crowns are rougher than their models.
     #[schemars(range(min = 0.0, max = 20.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub above_m: f64,
+    /// Edge of the cells of the canopy height model.
+    #[schemars(range(min = 0.1, max = 5.0), extend("x-unit" = "m", "x-source" = "Khosravipour et al. 2014 for 0.5 m and below"))]
+    pub chm_cell_m: f64,
+    /// Longest edge of the triangles of its layers above the ground.
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "Khosravipour et al. 2014, for the principle"))]
+    pub chm_max_edge_m: f64,
+    /// Distance of its layers from 5 m upwards; those below are at 0 and 2 m.
+    #[schemars(range(min = 0.5, max = 50.0), extend("x-unit" = "m", "x-source" = "Khosravipour et al. 2014"))]
+    pub chm_step_m: f64,
+    /// For `watershed`, `dalponte` and `silva`: largest crown radius.
+    #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "Dalponte and Coomes 2016: 10 cells of 1 m"))]
+    pub raster_radius_m: f64,
+    /// For the same: points no further than this from the canopy height model are on the surface.
+    #[schemars(range(min = 0.05, max = 5.0), extend("x-unit" = "m", "x-source" = "this program"))]
+    pub raster_surface_m: f64,
+    /// For the same: a tree whose apex is further below the canopy height model has the points of its
+    /// crown model instead.
+    #[schemars(range(min = 0.1, max = 30.0), extend("x-unit" = "m", "x-source" = "this program"))]
+    pub raster_hidden_m: f64,
+    /// For `dalponte`: cells lower than this share of the apex are not of the crown.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-source" = "Dalponte and Coomes 2016"))]
+    pub dalponte_seed_share: f64,
+    /// For `dalponte`: cells lower than this share of the crown's mean height are not of the crown.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-source" = "Dalponte and Coomes 2016"))]
+    pub dalponte_crown_share: f64,
+    /// For `silva`: largest crown radius, as a share of the height.
+    #[schemars(range(min = 0.01, max = 2.0), extend("x-source" = "Silva et al. 2016"))]
+    pub silva_radius_share: f64,
+    /// For `silva`: cells lower than this share of the apex are not of the crown.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-source" = "Silva et al. 2016"))]
+    pub silva_least_share: f64,
 }
 
 impl Default for SegmentationParams {
@@ -59,6 +96,16 @@ impl Default for SegmentationParams {
             reach_m: 15.0,
             min_height_m: 1.0,
             above_m: 1.5,
+            chm_cell_m: 0.5,
+            chm_max_edge_m: 1.5,
+            chm_step_m: 5.0,
+            raster_radius_m: 10.0,
+            raster_surface_m: 0.6,
+            raster_hidden_m: 2.0,
+            dalponte_seed_share: 0.45,
+            dalponte_crown_share: 0.55,
+            silva_radius_share: 0.6,
+            silva_least_share: 0.3,
         }
     }
 }

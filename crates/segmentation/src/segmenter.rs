@@ -1,6 +1,6 @@
 //! What a segmenter is given and what it gives back.
 
-use crate::methods::StarSac;
+use crate::methods::{RasterSegmenter, StarSac};
 use crate::{Claim, Crown, Error, SegmentMethod, SegmentationParams};
 use timberline_pointcloud::Frame;
 
@@ -133,5 +133,8 @@ pub trait Segmenter: Sync {
 pub fn segmenter(params: &SegmentationParams) -> Box<dyn Segmenter> {
     match params.method {
         SegmentMethod::Starsac => Box::new(StarSac { params: params.clone() }),
+        SegmentMethod::Watershed | SegmentMethod::Dalponte | SegmentMethod::Silva => {
+            Box::new(RasterSegmenter { params: params.clone() })
+        }
     }
 }

@@ -8,8 +8,16 @@ use timberline_artefact::stage::{Campaign, Stage};
 use timberline_artefact::{Kind, UnitId, read, tree_id};
 use timberline_pointcloud::frame::{quantise, ticks_from_world};
 use timberline_pointcloud::{Point, PointCloud, TileGrid};
-use timberline_segmentation::SegmentationParams;
 use timberline_segmentation::stage::SegmentationStage;
+use timberline_segmentation::{SegmentMethod, SegmentationParams};
+
+/// All that the program has built in.
+const METHODS: [SegmentMethod; 4] = [
+    SegmentMethod::Starsac,
+    SegmentMethod::Watershed,
+    SegmentMethod::Dalponte,
+    SegmentMethod::Silva,
+];
 
 const CORNER: [f64; 3] = [500_000.0, 4_200_000.0, 80.0];
 
@@ -59,6 +67,10 @@ fn detected(model: CrownModel) -> Detection {
 
 /// Tree and score of every point by its position, over all tiles.
 fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
+    run_with(grid, &SegmentationParams::default())
+}
+
+fn run_with(grid: TileGrid, params: &SegmentationParams) -> BTreeMap<[i64; 3], (u64, u32)> {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign { grid: Some(grid), ..Campaign::default() });
     let (points, models) = (points(), models());
@@ -76,8 +88,7 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
     }
     let mut labelled = BTreeMap::new();
     for (tile, cloud, _) in tiles {
-        let params = SegmentationParams::default();
-        let path = store.run::<SegmentationStage>(UnitId::Tile(tile), None, &params).unwrap();
+        let path = store.run::<SegmentationStage>(UnitId::Tile(tile), None, params).unwrap();
         let (_, Labels { tree_id, score }) = read::<Labels>(&path).unwrap();
         assert_eq!((tree_id.len(), score.len()), (cloud.len(), cloud.len()));
         for i in 0..cloud.len() {
@@ -89,10 +100,23 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
 
 #[test]
 fn labels_do_not_depend_on_the_tiles() {
-    let whole = run(TileGrid::new(128, [0, 0]).unwrap());
-    assert_eq!(whole.len(), 90 * 30 * 12);
-    for (edge, origin) in [(16, [0, 0]), (32, [5, 9]), (64, [32, 0])] {
-        assert!(run(TileGrid::new(edge, origin).unwrap()) == whole, "tiles of {edge} m");
+    for method in METHODS {
+        // Small blocks and reaches, so that there are several in the row.
+        let params = SegmentationParams {
+            method,
+            block_m: 24,
+            reach_m: 6.0,
+            raster_radius_m: 4.0,
+            ..SegmentationParams::default()
+        };
+        let whole = run_with(TileGrid::new(128, [0, 0]).unwrap(), &params);
+        assert_eq!(whole.len(), 90 * 30 * 12);
+        let labelled = whole.values().filter(|(tree, _)| *tree != 0).count();
+        assert!(labelled > 2000, "{method:?}: {labelled}");
+        for (edge, origin) in [(16, [0, 0]), (32, [5, 9]), (64, [32, 0])] {
+            let tiled = run_with(TileGrid::new(edge, origin).unwrap(), &params);
+            assert!(tiled == whole, "{method:?}: tiles of {edge} m");
+        }
     }
 }
 
