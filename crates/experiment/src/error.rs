@@ -36,9 +36,41 @@ pub enum Error {
         /// What is wrong with it.
         reason: &'static str,
     },
+    /// A name that nothing goes by.
+    #[error("no {what} is called `{name}`; known are {known}")]
+    Unknown {
+        /// What was named.
+        what: &'static str,
+        /// The name given.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// Columns of a plot that differ in length.
+    #[error("column `{column}` of a plot has {found} values for {points} points")]
+    Length {
+        /// Name of the column.
+        column: &'static str,
+        /// Points of the plot.
+        points: usize,
+        /// Values of the column.
+        found: usize,
+    },
     /// A virtual forest could not be grown.
     #[error(transparent)]
     Synth(#[from] timberline_synth::Error),
+    /// Treetops could not be sought.
+    #[error(transparent)]
+    Treetops(#[from] timberline_treetops::Error),
+    /// A segmenter failed.
+    #[error(transparent)]
+    Segmentation(#[from] timberline_segmentation::Error),
+    /// Trees could not be compared.
+    #[error(transparent)]
+    Evaluate(#[from] timberline_evaluate::Error),
+    /// Points could not be laid on a grid.
+    #[error(transparent)]
+    Grid(#[from] timberline_pointcloud::Error),
     /// A fit failed.
     #[error(transparent)]
     Crowns(#[from] timberline_crowns::Error),

@@ -1,6 +1,8 @@
 //! `experiment`: the papers' experiments, on generated data or on a run with known stems.
 
+mod f_figures;
 mod figures;
+mod segmentation;
 
 use super::known::{Filter, Position, as_tree, clusters, read_trees, stems_of_found, trees_of_run};
 use super::open::{Opened, Place};
@@ -26,6 +28,9 @@ enum What {
     /// Position of a tree from its crown: hull centroid, highest point, StarSac, L2 and L1
     /// paraboloids with and without a prior, over omega and delta (Polewski et al., section 6)
     Crowns(Crowns),
+    /// Trees found and points gathered by every segmenter: stands of five kinds, from thin to dense
+    /// scans
+    Segmentation(segmentation::Args),
 }
 
 /// Arguments of `experiment crowns`.
@@ -85,7 +90,13 @@ struct Crowns {
 /// # Errors
 /// When the data cannot be made or read, or a file cannot be written.
 pub fn run(program: &Program, args: &Args) -> Result<u8> {
-    let What::Crowns(args) = &args.what;
+    match &args.what {
+        What::Crowns(args) => crowns(program, args),
+        What::Segmentation(args) => segmentation::run(args),
+    }
+}
+
+fn crowns(program: &Program, args: &Crowns) -> Result<u8> {
     if args.cells.is_empty() || !args.cells.iter().all(|cell| (0.05..=5.0).contains(cell)) {
         return Err(Usage("--cells are edges in metres, from 0.05 to 5".to_owned()).into());
     }
@@ -175,7 +186,7 @@ fn of_campaign(program: &Program, args: &Crowns, campaign: &Path) -> Result<Name
 fn assess_all(datasets: Vec<Named>, cells_m: &[f64]) -> Result<Vec<Assessed>> {
     let settings = plan::sweeps();
     let clusters: usize = datasets.iter().map(|(_, clusters)| clusters.len()).sum();
-    let bar = bar((clusters * cells_m.len()) as u64);
+    let bar = bar("crowns", (clusters * cells_m.len()) as u64);
     out::talk(&format!(
         "{clusters} crowns, {} methods and parameters, {} cell sizes",
         settings.len(),
@@ -189,16 +200,16 @@ fn assess_all(datasets: Vec<Named>, cells_m: &[f64]) -> Result<Vec<Assessed>> {
 }
 
 /// A bar on a terminal, nothing elsewhere.
-fn bar(crowns: u64) -> ProgressBar {
+fn bar(what: &'static str, of: u64) -> ProgressBar {
     if !std::io::stderr().is_terminal() {
         return ProgressBar::hidden();
     }
-    let bar = ProgressBar::with_draw_target(Some(crowns), ProgressDrawTarget::stderr());
+    let bar = ProgressBar::with_draw_target(Some(of), ProgressDrawTarget::stderr());
     let template = "{prefix:>14} {bar:30} {pos}/{len}, {elapsed}, ETA {eta}";
     if let Ok(style) = ProgressStyle::with_template(template) {
         bar.set_style(style.progress_chars("=> "));
     }
-    bar.set_prefix("crowns");
+    bar.set_prefix(what);
     bar
 }
 

@@ -1,0 +1,146 @@
+//! `experiment segmentation`: all segmenters on generated stands.
+
+use super::{bar, f_figures};
+use crate::cli::{DONE, Usage, out};
+use anyhow::{Context, Result};
+use std::path::{Path, PathBuf};
+use timberline_artefact::publish::write_atomic;
+use timberline_experiment::segmentation::{
+    Chain, Experiment, Method, Outcome, Pooled, StandKind, compare, method, methods, pool, text,
+};
+
+/// Arguments of `experiment segmentation`.
+#[derive(Debug, clap::Args)]
+#[command(
+    after_help = "Stands are grown and scanned, trees are found by the airborne chain with its default parameters, and every \
+    segmenter gives the points their trees; trees and points are compared with the truth.\n\n\
+    Files in the output folder:\n  \
+    report.md        recall, precision, F, errors, points and crowns by stand, segmenter and density\n  \
+    cases.csv        lines for every case and segmenter: all trees, visible ones, classes of height, layers\n  \
+    trees.csv        a line for every true tree and every false one, for every case and segmenter\n  \
+    experiment.json  all parameters and figures\n  \
+    density.png, .svg   F over density for every kind of stand and segmenter\n  \
+    layers.png, .svg    F by canopy layer, at the density nearest to 10 points per square metre\n\n\
+    The same arguments give the same bytes, whatever the number of threads."
+)]
+pub(super) struct Args {
+    /// Seed of the generated stands
+    #[arg(long, default_value_t = 1)]
+    seed: u32,
+    /// Repetitions, each with trees of its own
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u32).range(1..=1000))]
+    repeats: u32,
+    /// Densities of points, all returns, 1/m²
+    #[arg(long, value_name = "N", value_delimiter = ',', default_values_t = [2.0, 5.0, 10.0, 20.0, 60.0])]
+    densities: Vec<f64>,
+    /// Kinds of stand [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    stands: Vec<String>,
+    /// Segmenters [default: all]
+    #[arg(long, value_name = "NAME", value_delimiter = ',')]
+    segmenters: Vec<String>,
+    /// Edge of the square in which trees are judged, m
+    #[arg(long, value_name = "M", default_value_t = 100.0)]
+    edge: f64,
+    /// Slope of the ground, degrees
+    #[arg(long, value_name = "DEG", default_value_t = 6.0)]
+    slope: f64,
+    /// Folder to write to
+    #[arg(long, value_name = "DIR", default_value = "target/experiment-segmentation")]
+    out: PathBuf,
+    /// Threads [default: one a processor]
+    #[arg(long)]
+    jobs: Option<usize>,
+    /// Print the figures as JSON
+    #[arg(long)]
+    json: bool,
+}
+
+/// Runs the command.
+///
+/// # Errors
+/// When an argument makes no sense, a stage fails, or a file cannot be written.
+pub(super) fn run(args: &Args) -> Result<u8> {
+    let experiment = experiment(args)?;
+    let methods = segmenters(&args.segmenters)?;
+    let pool_of_threads =
+        rayon::ThreadPoolBuilder::new().num_threads(args.jobs.unwrap_or(0)).build()?;
+    let cases = experiment.cases().len();
+    out::talk(&format!("{cases} stands, {} segmenters", methods.len()));
+    let bar = bar("stands", cases as u64);
+    let chain = Chain::default();
+    let outcomes =
+        pool_of_threads.install(|| compare(&experiment, &chain, &methods, &|| bar.inc(1)))?;
+    bar.finish_and_clear();
+    let pooled = pool(&outcomes, &experiment.height_edges_m);
+    let json = serde_json::json!({
+        "experiment": experiment,
+        "chain": chain,
+        "cases": outcomes,
+        "pooled": pooled,
+    });
+    write(&args.out, &experiment, &outcomes, &pooled, &json)?;
+    if args.json {
+        out::json(&json)?;
+    } else {
+        out::raw(text::markdown(&experiment, &pooled).as_bytes());
+        out::talk(&format!("written to {}", args.out.display()));
+    }
+    Ok(DONE)
+}
+
+fn experiment(args: &Args) -> Result<Experiment> {
+    let stands: Result<Vec<StandKind>, _> = args.stands.iter().map(|name| name.parse()).collect();
+    let stands = stands.map_err(|error| Usage(error.to_string()))?;
+    let experiment = Experiment {
+        seed: args.seed,
+        repeats: args.repeats,
+        stands: if stands.is_empty() { StandKind::ALL.to_vec() } else { stands },
+        densities_per_m2: args.densities.clone(),
+        judged_edge_m: args.edge,
+        slope_deg: args.slope,
+        ..Experiment::default()
+    };
+    experiment.check().map_err(|error| Usage(error.to_string()))?;
+    Ok(experiment)
+}
+
+fn segmenters(names: &[String]) -> Result<Vec<Method>> {
+    if names.is_empty() {
+        return Ok(methods());
+    }
+    let chosen: Result<Vec<Method>, _> = names.iter().map(|name| method(name)).collect();
+    Ok(chosen.map_err(|error| Usage(error.to_string()))?)
+}
+
+/// The end of the report.
+const FIGURES: &str =
+    "\n## Figures\n\n![F over density](density.png)\n\n![F by canopy layer](layers.png)\n";
+
+fn write(
+    folder: &Path,
+    experiment: &Experiment,
+    outcomes: &[Outcome],
+    pooled: &[Pooled],
+    json: &serde_json::Value,
+) -> Result<()> {
+    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+    let files = [
+        ("report.md", text::markdown(experiment, pooled) + FIGURES),
+        ("cases.csv", text::cases_csv(outcomes)),
+        ("trees.csv", text::trees_csv(outcomes)),
+        ("experiment.json", serde_json::to_string_pretty(json)? + "\n"),
+    ];
+    for (name, text) in files {
+        write_atomic(&folder.join(name), text.as_bytes())?;
+    }
+    let charts = [
+        ("density", f_figures::density(experiment, pooled)),
+        ("layers", f_figures::layers(experiment, pooled)),
+    ];
+    for (name, chart) in charts {
+        chart.write_png(&folder.join(format!("{name}.png")))?;
+        write_atomic(&folder.join(format!("{name}.svg")), chart.svg()?.as_bytes())?;
+    }
+    Ok(())
+}
