@@ -47,7 +47,7 @@ impl Chain {
         let id = tree_id(top.world_m[0], top.world_m[1]);
         let first_only = params.returns == timberline_crowns::params::Returns::First;
         let accept = |i: usize| {
-            let wanted = !first_only || cloud.return_number[i] <= 1;
+            let wanted = !first_only || plot.is_first[i];
             wanted.then(|| f64::from(plot.height_m[i]) >= params.min_height_m)
         };
         let apex = cloud.local(top.index as usize);
@@ -93,6 +93,7 @@ pub fn view<'a>(plot: &'a Plot, markers: &'a [Marker]) -> View<'a> {
         y: &cloud.y,
         z: &cloud.z,
         height_m: &plot.height_m,
+        is_first: &plot.is_first,
         markers,
     }
 }

@@ -3,8 +3,9 @@
 use super::chain::view;
 use super::plot::Plot;
 use crate::Error;
-use std::fmt;
-use timberline_segmentation::{Claim, Marker, SegmentationParams, Segmenter, View, label};
+use timberline_segmentation::{
+    Claim, Marker, SegmentMethod, SegmentationParams, View, segment_in_blocks, segmenter,
+};
 
 /// A tree found, with its position in the world and the height of its top above ground, m.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,32 +28,47 @@ pub struct Segmented {
 }
 
 /// A way to segment.
-#[derive(Clone, Copy)]
+#[derive(Debug, Clone, Copy)]
 pub struct Method {
     /// Name in tables and arguments.
     pub name: &'static str,
     /// What it does, in a few words.
     pub about: &'static str,
-    segment: fn(&View<'_>) -> Result<Vec<Claim>, Error>,
-    /// Whether it finds trees itself instead of taking those of the detection.
-    pub own_trees: bool,
+    how: How,
 }
 
-impl fmt::Debug for Method {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.debug_struct("Method").field("name", &self.name).finish_non_exhaustive()
-    }
+#[derive(Debug, Clone, Copy)]
+enum How {
+    /// Points for the trees of the detection, as the stage `segmentation` does it.
+    Given(SegmentMethod),
 }
 
 /// All ways to segment, in the sequence of the tables.
 #[must_use]
 pub fn methods() -> Vec<Method> {
-    vec![Method {
-        name: "starsac",
-        about: "surface and volume of the crown models (Tittmann et al. 2011)",
-        segment: |view| run(&Crowns, view),
-        own_trees: false,
-    }]
+    let given = |method, name, about| Method { name, about, how: How::Given(method) };
+    vec![
+        given(
+            SegmentMethod::Starsac,
+            "starsac",
+            "surface and volume of the crown models (Tittmann et al. 2011)",
+        ),
+        given(
+            SegmentMethod::Watershed,
+            "watershed",
+            "marker-controlled watershed on a pit-free canopy height model (Meyer 1994)",
+        ),
+        given(
+            SegmentMethod::Dalponte,
+            "dalponte",
+            "region growing on a pit-free canopy height model (Dalponte and Coomes 2016)",
+        ),
+        given(
+            SegmentMethod::Silva,
+            "silva",
+            "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)",
+        ),
+    ]
 }
 
 /// The way of a name.
@@ -75,14 +91,23 @@ impl Method {
     /// # Errors
     /// What the segmenter refuses.
     pub fn run(&self, plot: &Plot, markers: &[Marker]) -> Result<Segmented, Error> {
-        let claims = (self.segment)(&view(plot, markers))?;
-        let trees = if self.own_trees { own_trees(plot, &claims) } else { given(plot, markers) };
-        Ok(Segmented { trees, claims })
+        match self.how {
+            How::Given(method) => {
+                let claims = segmented_as_given(&view(plot, markers), method)?;
+                Ok(Segmented { trees: given(plot, markers), claims })
+            }
+        }
     }
 }
 
-fn run(segmenter: &dyn Segmenter, view: &View<'_>) -> Result<Vec<Claim>, Error> {
-    Ok(segmenter.segment(view)?)
+fn segmented_as_given(view: &View<'_>, method: SegmentMethod) -> Result<Vec<Claim>, Error> {
+    let params = SegmentationParams { method, ..SegmentationParams::default() };
+    let segmenter = segmenter(&params);
+    Ok(if segmenter.is_local() {
+        segmenter.segment(view)?
+    } else {
+        segment_in_blocks(&*segmenter, view, &vec![true; view.len()], params.block_m)?
+    })
 }
 
 fn given(plot: &Plot, markers: &[Marker]) -> Vec<FoundTree> {
@@ -91,35 +116,4 @@ fn given(plot: &Plot, markers: &[Marker]) -> Vec<FoundTree> {
         FoundTree { id: marker.crown.id, top_m: [x, y], height_m: marker.height_m }
     };
     markers.iter().map(tree).collect()
-}
-
-/// A tree for every id, its top the highest of its points (the first in canonical order of equals).
-fn own_trees(plot: &Plot, claims: &[Claim]) -> Vec<FoundTree> {
-    let mut tops: std::collections::BTreeMap<u64, usize> = std::collections::BTreeMap::new();
-    for (i, claim) in claims.iter().enumerate().filter(|(_, claim)| claim.id != 0) {
-        let top = tops.entry(claim.id).or_insert(i);
-        if plot.height_m[i] > plot.height_m[*top] {
-            *top = i;
-        }
-    }
-    let tree = |(id, top): (u64, usize)| {
-        let [x, y, _] = plot.cloud.world(top);
-        FoundTree { id, top_m: [x, y], height_m: f64::from(plot.height_m[top]) }
-    };
-    tops.into_iter().map(tree).collect()
-}
-
-/// The crown models themselves as segments.
-struct Crowns;
-
-impl Segmenter for Crowns {
-    fn reach_m(&self) -> f64 {
-        SegmentationParams::default().reach_m
-    }
-
-    fn segment(&self, view: &View<'_>) -> Result<Vec<Claim>, timberline_segmentation::Error> {
-        let standing = view.markers.iter().filter(|marker| marker.crown.radius_m > 0.0);
-        let crowns: Vec<_> = standing.map(|marker| marker.crown).collect();
-        label([view.x, view.y, view.z], view.height_m, &crowns, &SegmentationParams::default())
-    }
 }

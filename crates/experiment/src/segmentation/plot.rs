@@ -32,6 +32,8 @@ pub struct Plot {
     pub cloud: PointCloud,
     /// Height above the ground, m.
     pub height_m: Vec<f32>,
+    /// Whether a point is the first return of its pulse, or may be for all that is known.
+    pub is_first: Vec<bool>,
     /// The true tree of every point, 0 for none.
     pub label: Vec<u64>,
     /// The true trees, also around the judged area.
@@ -89,7 +91,8 @@ impl Plot {
         let height_m = (0..cloud.len()).map(height).collect();
         let trees = scene.forest().trees.iter().map(|tree| true_tree(scene, tree)).collect();
         let density_per_m2 = density(&cloud, &judged);
-        Self { height_m, label, trees, judged, density_per_m2, pulses_per_m2, cloud }
+        let is_first = cloud.return_number.iter().map(|number| *number <= 1).collect();
+        Self { height_m, is_first, label, trees, judged, density_per_m2, pulses_per_m2, cloud }
     }
 
     /// Whether a position is judged.
