@@ -34,3 +34,16 @@ pub enum Error {
         found: usize,
     },
 }
+
+impl Error {
+    /// [`Error::Length`] for the first of some columns that has not a value for every point.
+    pub(crate) fn check_lengths(
+        expected: usize,
+        columns: &[(&'static str, usize)],
+    ) -> Result<(), Self> {
+        match columns.iter().find(|(_, found)| *found != expected) {
+            Some(&(column, found)) => Err(Self::Length { column, expected, found }),
+            None => Ok(()),
+        }
+    }
+}

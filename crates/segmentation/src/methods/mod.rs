@@ -1,10 +1,15 @@
 //! The segmenters.
 
 pub mod dalponte;
+pub mod li;
 pub mod raster;
+pub mod segments;
 pub mod silva;
 pub mod starsac;
+pub mod surface;
 pub mod watershed;
 
+pub use li::{Li, LiParams};
 pub use raster::{RasterSegmenter, Seed};
+pub use segments::Segments;
 pub use starsac::StarSac;
