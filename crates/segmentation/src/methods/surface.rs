@@ -1,0 +1,78 @@
+//! Which points of a segment lie on its upper surface, for segmenters that work on points.
+
+use crate::chm::{Chm, PitFree};
+use crate::methods::raster::STEEPEST;
+use crate::{Claim, Error, View};
+
+/// What is needed to tell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Surface {
+    /// How the canopy height model is made.
+    pub chm: PitFree,
+    /// Points no further than this from the surface are on it, m.
+    pub tolerance_m: f64,
+}
+
+impl Default for Surface {
+    fn default() -> Self {
+        let chm = PitFree { cell_m: 0.5, max_edge_m: 1.5, step_m: 5.0 };
+        Self { chm, tolerance_m: 0.6 }
+    }
+}
+
+/// The claims of segments on their points; `tree` is the index of every point's marker, or
+/// [`NO_TREE`](crate::methods::raster::NO_TREE).
+///
+/// A cell of the pit-free canopy height model belongs to the tree of its highest point. For the
+/// points of that tree the surface is that of the model, for those of other trees in the cell (they
+/// stand below) it is their own highest point there. On the surface the score falls with the distance
+/// from 1 to 1/2 (across the surface, to first order), below it with the share of the surface's
+/// height from 1/2 to 1/4.
+///
+/// # Errors
+/// As [`Chm::pit_free`].
+pub fn claims(view: &View<'_>, tree: &[u32], surface: &Surface) -> Result<Vec<Claim>, Error> {
+    let chm = Chm::pit_free(view, &surface.chm)?;
+    let owner: Vec<Option<u32>> = chm.top.iter().map(|top| tree.get(*top as usize).copied()).collect();
+    let tops = tops(view, tree, &chm);
+    let claim = |index: usize| {
+        let (own, height_m) = (tree[index], f64::from(view.height_m[index]));
+        let marker = view.markers.get(own as usize)?;
+        let cell = chm.cell_at(view.x[index], view.y[index])?;
+        let [surface_m, slope] = if owner[cell] == Some(own) {
+            let joined = |cell: usize| owner[cell] == Some(own);
+            chm.surface(view.x[index], view.y[index], joined)?
+        } else {
+            let place = tops.binary_search_by_key(&(own, cell as u32), |top| top.0).ok()?;
+            [f64::from(tops[place].1), 0.0]
+        };
+        let score = score(surface_m - height_m, height_m / surface_m, slope, surface.tolerance_m);
+        Some(Claim { id: marker.crown.id, score: score as f32 })
+    };
+    Ok((0..view.len()).map(|index| claim(index).unwrap_or_default()).collect())
+}
+
+fn score(below_m: f64, share: f64, squared_slope: f64, tolerance_m: f64) -> f64 {
+    let distance_m = below_m.abs() / (1.0 + squared_slope.min(STEEPEST * STEEPEST)).sqrt();
+    if distance_m < tolerance_m {
+        1.0 - 0.5 * distance_m / tolerance_m
+    } else if below_m < 0.0 {
+        0.5
+    } else {
+        0.25 + 0.25 * share.clamp(0.0, 1.0)
+    }
+}
+
+/// Height of the highest point of every tree in every cell, sorted by both.
+fn tops(view: &View<'_>, tree: &[u32], chm: &Chm) -> Vec<((u32, u32), f32)> {
+    let mut tops: Vec<((u32, u32), f32)> = (0..view.len())
+        .filter(|&index| (tree[index] as usize) < view.markers.len())
+        .filter_map(|index| {
+            let cell = chm.cell_at(view.x[index], view.y[index])?;
+            Some(((tree[index], cell as u32), view.height_m[index]))
+        })
+        .collect();
+    tops.sort_unstable_by(|a, b| a.0.cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    tops.dedup_by_key(|top| top.0);
+    tops
+}
