@@ -1,24 +1,8 @@
 //! Which points of a segment lie on its upper surface, for segmenters that work on points.
 
 use crate::chm::{Chm, PitFree};
-use crate::methods::raster::STEEPEST;
-use crate::{Claim, Error, View};
-
-/// What is needed to tell.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Surface {
-    /// How the canopy height model is made.
-    pub chm: PitFree,
-    /// Points no further than this from the surface are on it, m.
-    pub tolerance_m: f64,
-}
-
-impl Default for Surface {
-    fn default() -> Self {
-        let chm = PitFree { cell_m: 0.5, max_edge_m: 1.5, step_m: 5.0 };
-        Self { chm, tolerance_m: 0.6 }
-    }
-}
+use crate::methods::raster::{STEEPEST, seeds, with_hidden};
+use crate::{Claim, Error, SegmentationParams, View};
 
 /// The claims of segments on their points; `tree` is the index of every point's marker, or
 /// [`NO_TREE`](crate::methods::raster::NO_TREE).
@@ -29,12 +13,26 @@ impl Default for Surface {
 /// from 1 to 1/2 (across the surface, to first order), below it with the share of the surface's
 /// height from 1/2 to 1/4.
 ///
+/// A tree that the model hides ([`seeds`]) has the points its crown model claims, except those on the
+/// surface of another: segments that are compared in the plane leave it next to nothing.
+///
 /// # Errors
 /// As [`Chm::pit_free`].
-pub fn claims(view: &View<'_>, tree: &[u32], surface: &Surface) -> Result<Vec<Claim>, Error> {
-    let chm = Chm::pit_free(view, &surface.chm)?;
-    let owner: Vec<Option<u32>> = chm.top.iter().map(|top| tree.get(*top as usize).copied()).collect();
-    let tops = tops(view, tree, &chm);
+pub fn claims(
+    view: &View<'_>,
+    tree: &[u32],
+    params: &SegmentationParams,
+) -> Result<Vec<Claim>, Error> {
+    let chm = Chm::pit_free(view, &PitFree::of(params))?;
+    let (_, hidden) = seeds(&chm, view.markers, params);
+    with_hidden(view, on_surface(view, tree, &chm, params.raster_surface_m), &hidden, params)
+}
+
+/// Claims without a thought of hidden trees.
+fn on_surface(view: &View<'_>, tree: &[u32], chm: &Chm, tolerance_m: f64) -> Vec<Claim> {
+    let owner: Vec<Option<u32>> = 
+        chm.top.iter().map(|top| tree.get(*top as usize).copied()).collect();
+    let tops = tops(view, tree, chm);
     let claim = |index: usize| {
         let (own, height_m) = (tree[index], f64::from(view.height_m[index]));
         let marker = view.markers.get(own as usize)?;
@@ -46,10 +44,10 @@ pub fn claims(view: &View<'_>, tree: &[u32], surface: &Surface) -> Result<Vec<Cl
             let place = tops.binary_search_by_key(&(own, cell as u32), |top| top.0).ok()?;
             [f64::from(tops[place].1), 0.0]
         };
-        let score = score(surface_m - height_m, height_m / surface_m, slope, surface.tolerance_m);
+        let score = score(surface_m - height_m, height_m / surface_m, slope, tolerance_m);
         Some(Claim { id: marker.crown.id, score: score as f32 })
     };
-    Ok((0..view.len()).map(|index| claim(index).unwrap_or_default()).collect())
+    (0..view.len()).map(|index| claim(index).unwrap_or_default()).collect()
 }
 
 fn score(below_m: f64, share: f64, squared_slope: f64, tolerance_m: f64) -> f64 {

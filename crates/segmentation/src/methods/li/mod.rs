@@ -12,6 +12,7 @@
 //! neighbour among those already asked. That is one search in a small grid, so the cost is
 //! proportional to the number of points times the number of tops within a crown radius.
 
+mod asked;
 mod growth;
 mod maxima;
 mod pool;
@@ -19,9 +20,9 @@ mod pool;
 mod reference;
 mod segmenter;
 
-pub use segmenter::Li;
+pub use segmenter::{Li, grow};
 
-use crate::{Error, Segments};
+use crate::{Error, SegmentationParams, Segments};
 use growth::Growth;
 use pool::Pool;
 
@@ -61,6 +62,20 @@ impl Default for LiParams {
 }
 
 impl LiParams {
+    /// Those named `li_` among the parameters of the stage.
+    #[must_use]
+    pub fn of(params: &SegmentationParams) -> Self {
+        Self {
+            gap_low_m: params.li_gap_low_m,
+            gap_high_m: params.li_gap_high_m,
+            split_height_m: params.li_split_height_m,
+            window_m: params.li_window_m,
+            max_radius_m: params.li_radius_m,
+            min_top_m: params.li_min_top_m,
+            min_height_m: params.min_height_m,
+        }
+    }
+
     /// The gap for a point at a height.
     fn gap_m(&self, height_m: f64) -> f64 {
         if height_m > self.split_height_m { self.gap_high_m } else { self.gap_low_m }
@@ -110,7 +125,7 @@ pub fn trees(
     let ranked = Ranked::new(x, y, height_m, lowest);
     let maxima = maxima::local_maxima(&ranked, params.window_m);
     let mut pool = Pool::new(&ranked, params.max_radius_m);
-    let mut growth = Growth::new(&ranked, Some(&maxima), params);
+    let mut growth = Growth::new(&ranked, &maxima, params);
     let mut tree_of = vec![Segments::NONE; ranked.index.len()];
     let mut tops = Vec::new();
     for rank in 0..ranked.index.len() {
@@ -121,7 +136,7 @@ pub fn trees(
             continue;
         }
         let top = [ranked.x[rank], ranked.y[rank]];
-        for taken in growth.grow(&mut pool, top, &[]) {
+        for taken in growth.grow(&mut pool, top) {
             tree_of[*taken as usize] = tops.len() as u32;
         }
         tops.push(ranked.index[rank]);

@@ -1,72 +1,148 @@
 //! Trees grown from given tops.
 
-use super::growth::{Growth, Rival};
-use super::pool::Pool;
+use super::asked::Asked;
 use super::{LiParams, Ranked};
-use crate::{Claim, Error, Marker, Segmenter, View};
+use crate::methods::raster::NO_TREE;
+use crate::methods::surface;
+use crate::{Claim, Error, Marker, SegmentationParams, Segmenter, View};
 
-/// [`super::trees`] with the trees given: each starts at its marker instead of at the highest point
-/// that is left.
-#[derive(Debug, Clone, Copy, PartialEq, Default)]
+/// [`super::trees`] with the trees given, and all grown at once.
+///
+/// From the highest point down, each has the tree of the nearest point in the plane that was asked
+/// before it, markers among them, if that is no further than the gap for its height and the tree's
+/// top no further than the largest radius. A point further away would start a tree of its own; as
+/// trees are given it has none, and no point has its tree from it.
+///
+/// Growing one tree after the other, as the paper does, gives the higher tree what lies between:
+/// with the true trees for markers, in simulated stands at 10 points/m², mean crown IoU was 0.69
+/// instead of 0.90 in open conifer, 0.46 instead of 0.56 in mixed forest.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Li {
-    /// Gaps, radius, heights; `min_top_m` does not matter.
-    pub params: LiParams,
+    /// Those named `li_`, `min_height_m`, and those for the canopy's surface and trees below it.
+    pub params: SegmentationParams,
 }
 
 impl Segmenter for Li {
+    /// A crown, and those it meets.
     fn reach_m(&self) -> f64 {
-        2.0 * self.params.max_radius_m
+        (2.0 * self.params.li_radius_m).max(self.params.reach_m)
     }
 
     fn segment(&self, view: &View<'_>) -> Result<Vec<Claim>, Error> {
-        let tree = self.grow(view);
-        let id = |&tree: &u32| view.markers.get(tree as usize).map_or(0, |m| m.crown.id);
-        Ok(tree.iter().map(|t| Claim { id: id(t), score: 0.0 }).collect())
+        view.check()?;
+        surface::claims(view, &grow(view, &LiParams::of(&self.params)), &self.params)
     }
 }
 
-/// How markers are honoured, for trial.
-pub static VARIANT: std::sync::atomic::AtomicU32 = std::sync::atomic::AtomicU32::new(0);
-
-impl Li {
-    /// For every point the index of its marker, or `u32::MAX`.
-    fn grow(&self, view: &View<'_>) -> Vec<u32> {
-        let variant = VARIANT.load(std::sync::atomic::Ordering::Relaxed);
-        let params = &self.params;
-        let ranked = Ranked::new(view.x, view.y, view.height_m, params.min_height_m);
-        let maxima = super::maxima::local_maxima(&ranked, params.window_m);
-        let mut pool = Pool::new(&ranked, params.max_radius_m);
-        let use_max = variant & 1 == 0;
-        let mut growth = Growth::new(&ranked, use_max.then_some(&maxima[..]), params);
-        let seeds = seeds(view.markers, &ranked);
-        let mut tree_of = vec![u32::MAX; view.x.len()];
-        let mut rivals = Vec::new();
-        for (place, (marker, seed)) in seeds.iter().enumerate() {
-            rivals.clear();
-            if variant & 2 == 0 {
-                rivals.extend(seeds[place + 1..].iter().map(|(_, s)| *s).filter(|other| {
-                    let (dx, dy) = (other.at[0] - seed.at[0], other.at[1] - seed.at[1]);
-                    dx * dx + dy * dy <= params.max_radius_m * params.max_radius_m
-                }));
-            }
-            for &rank in growth.grow(&mut pool, seed.at, &rivals) {
-                tree_of[ranked.index[rank as usize] as usize] = *marker;
-            }
+/// For every point the index of its marker, or [`NO_TREE`].
+#[must_use]
+pub fn grow(view: &View<'_>, params: &LiParams) -> Vec<u32> {
+    let ranked = Ranked::new(view.x, view.y, view.height_m, params.min_height_m);
+    let seeds = seeds(view.markers, &ranked);
+    let mut asked = Asked::over(&ranked.x, &ranked.y);
+    let mut coming = seeds.iter().zip(0..).peekable();
+    let mut tree = vec![NO_TREE; view.len()];
+    for (rank, &index) in ranked.index.iter().enumerate() {
+        while let Some((seed, label)) = coming.next_if(|(seed, _)| seed.rank <= rank) {
+            asked.insert(seed.at, label);
         }
-        tree_of
+        let at = [ranked.x[rank], ranked.y[rank]];
+        let (squared, label) = asked.nearest(at);
+        let Some(seed) = seeds.get(label as usize) else {
+            continue;
+        };
+        let near = squared.sqrt() <= params.gap_m(ranked.height_m[rank]);
+        if near && squared_m2(at, seed.at) <= params.max_radius_m * params.max_radius_m {
+            asked.insert(at, label);
+            tree[index as usize] = seed.marker;
+        }
     }
+    tree
+}
+
+fn squared_m2(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let (dx, dy) = (a[0] - b[0], a[1] - b[1]);
+    dx * dx + dy * dy
+}
+
+/// Where a tree starts.
+#[derive(Debug, Clone, Copy)]
+struct Seed {
+    at: [f64; 2],
+    /// First point that is not higher.
+    rank: usize,
+    marker: u32,
 }
 
 /// The markers' tops from the highest down, equal ones by id.
-fn seeds(markers: &[Marker], ranked: &Ranked) -> Vec<(u32, Rival)> {
-    let mut order: Vec<u32> = (0..markers.len() as u32).collect();
-    let height = |i: u32| markers[i as usize].height_m;
-    order.sort_by(|&a, &b| {
-        height(b).total_cmp(&height(a)).then_with(|| {
-            markers[a as usize].crown.id.cmp(&markers[b as usize].crown.id)
-        })
+fn seeds(markers: &[Marker], ranked: &Ranked) -> Vec<Seed> {
+    let mut order: Vec<(u32, &Marker)> = (0..).zip(markers).collect();
+    order.sort_by(|(_, a), (_, b)| {
+        b.height_m.total_cmp(&a.height_m).then(a.crown.id.cmp(&b.crown.id))
     });
-    let rank = |i: u32| ranked.height_m.partition_point(|h| *h > height(i)) as u32;
-    let at = |i: u32| [0, 1].map(|axis| markers[i as usize].crown.apex[axis]);
-    order.into_iter().map(|i| (i, Rival { at: at(i), rank: rank(i) })).collect()
+    let seed = |(marker, of): (u32, &Marker)| {
+        let rank = ranked.height_m.partition_point(|height_m| *height_m > of.height_m);
+        Seed { at: [of.crown.apex[0], of.crown.apex[1]], rank, marker }
+    };
+    order.into_iter().map(seed).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Crown, Piece};
+
+    fn marker(id: u64, x: f64, height_m: f64) -> Marker {
+        let apex = [x, 0.0, height_m];
+        let (coefficients, tolerance_m) = ([0.0; 2], 0.6);
+        let crown =
+            Crown { id, apex, coefficients, radius_m: 0.0, tolerance_m, oblique: false };
+        Marker { crown, height_m, score: 1.0 }
+    }
+
+    /// A ridge of two tops with a point every quarter of a metre, then a gap, then a tree without a
+    /// marker.
+    fn ridge() -> Piece {
+        let mut piece = Piece { markers: vec![marker(5, 0.0, 20.0), marker(3, 6.0, 18.0)], ..Piece::default() };
+        for i in -16..80 {
+            let x = 0.25 * f64::from(i);
+            let height = (20.0 - x.abs()).max(18.0 - (x - 6.0).abs()).max(16.0 - (x - 15.0).abs());
+            if !(9.0..13.0).contains(&x) {
+                piece.x.push(x);
+                piece.y.push(0.0);
+                piece.z.push(100.0 + height);
+                piece.height_m.push(height as f32);
+                piece.is_first.push(true);
+            }
+        }
+        piece
+    }
+
+    #[test]
+    fn trees_meet_in_the_valley_and_stop_at_the_gap() {
+        let piece = ridge();
+        let claims = Li { params: SegmentationParams::default() }.segment(&piece.view()).unwrap();
+        let at = |x: f64| claims[piece.x.iter().position(|other| *other == x).unwrap()].id;
+        assert_eq!([-3.0, 0.0, 3.75, 4.25, 8.0].map(at), [5, 5, 5, 3, 3]);
+        assert_eq!([13.0, 15.0, 19.0].map(at), [0; 3], "no tree is given there");
+        assert!(claims.iter().all(|claim| (claim.id == 0) == (claim.score == 0.0)));
+        assert!(claims.iter().filter(|claim| claim.score > 0.5).count() > 40);
+    }
+
+    #[test]
+    fn the_largest_radius_and_the_least_height_hold() {
+        let piece = ridge();
+        let params = LiParams { max_radius_m: 2.0, min_height_m: 19.0, ..LiParams::default() };
+        let tree = grow(&piece.view(), &params);
+        assert_eq!(tree.iter().filter(|tree| **tree == 0).count(), 9);
+        assert!(tree.iter().all(|tree| [0, NO_TREE].contains(tree)));
+    }
+
+    #[test]
+    fn nothing_comes_of_nothing() {
+        assert_eq!(grow(&Piece::default().view(), &LiParams::default()), []);
+        let piece = Piece { markers: Vec::new(), ..ridge() };
+        let claims = Li { params: SegmentationParams::default() }.segment(&piece.view()).unwrap();
+        assert!(claims.iter().all(|claim| *claim == Claim::default()));
+    }
 }
