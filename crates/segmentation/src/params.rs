@@ -25,6 +25,8 @@ pub enum SegmentMethod {
     Dalponte,
     /// Voronoi cells on a pit-free canopy height model (Silva et al. 2016).
     Silva,
+    /// Growing from the top down by spacing in the plane (Li et al. 2012).
+    Li,
 }
 
 /// Parameters of the stage `segmentation`.
@@ -85,6 +87,19 @@ pub struct SegmentationParams {
     /// For `silva`: cells lower than this share of the apex are not of the crown.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-source" = "Silva et al. 2016"))]
     pub silva_least_share: f64,
+    /// For `li`: spacing in the plane from which a point is of another tree, below
+    /// `li_split_height_m`.
+    #[schemars(range(min = 0.1, max = 20.0), extend("x-unit" = "m", "x-source" = "Li et al. 2012, section Segmentation: threshold"))]
+    pub li_gap_low_m: f64,
+    /// The same above it, where crowns are wider.
+    #[schemars(range(min = 0.1, max = 20.0), extend("x-unit" = "m", "x-source" = "Li et al. 2012, section Segmentation: threshold"))]
+    pub li_gap_high_m: f64,
+    /// For `li`: height above which the larger spacing holds.
+    #[schemars(range(min = 0.0, max = 100.0), extend("x-unit" = "m", "x-source" = "Li et al. 2012, section Segmentation: 15 m"))]
+    pub li_split_height_m: f64,
+    /// For `li`: farthest a tree reaches from its top.
+    #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "this program: as raster_radius_m"))]
+    pub li_radius_m: f64,
 }
 
 impl Default for SegmentationParams {
@@ -106,6 +121,10 @@ impl Default for SegmentationParams {
             dalponte_crown_share: 0.55,
             silva_radius_share: 0.6,
             silva_least_share: 0.3,
+            li_gap_low_m: 1.5,
+            li_gap_high_m: 2.0,
+            li_split_height_m: 15.0,
+            li_radius_m: 10.0,
         }
     }
 }

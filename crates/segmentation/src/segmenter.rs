@@ -1,6 +1,6 @@
 //! What a segmenter is given and what it gives back.
 
-use crate::methods::{RasterSegmenter, StarSac};
+use crate::methods::{Li, RasterSegmenter, StarSac};
 use crate::{Claim, Crown, Error, SegmentMethod, SegmentationParams};
 use timberline_pointcloud::Frame;
 
@@ -136,5 +136,6 @@ pub fn segmenter(params: &SegmentationParams) -> Box<dyn Segmenter> {
         SegmentMethod::Watershed | SegmentMethod::Dalponte | SegmentMethod::Silva => {
             Box::new(RasterSegmenter { params: params.clone() })
         }
+        SegmentMethod::Li => Box::new(Li { params: params.clone() }),
     }
 }

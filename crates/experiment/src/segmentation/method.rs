@@ -68,6 +68,11 @@ pub fn methods() -> Vec<Method> {
             "silva",
             "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)",
         ),
+        given(
+            SegmentMethod::Li,
+            "li",
+            "growing from the top down by spacing in the plane (Li et al. 2012)",
+        ),
     ]
 }
 

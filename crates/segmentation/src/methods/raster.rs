@@ -135,7 +135,7 @@ fn claims(
 pub const STEEPEST: f64 = 2.0;
 
 /// Gives hidden trees the points their crowns claim, except those on a surface.
-fn with_hidden(
+pub(crate) fn with_hidden(
     view: &View<'_>,
     mut claims: Vec<Claim>,
     hidden: &[Crown],

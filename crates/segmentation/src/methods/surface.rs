@@ -23,14 +23,23 @@ pub fn claims(
     tree: &[u32],
     params: &SegmentationParams,
 ) -> Result<Vec<Claim>, Error> {
-    let chm = Chm::pit_free(view, &PitFree::of(params))?;
+    let chm = Chm::pit_free(view, &model(params))?;
     let (_, hidden) = seeds(&chm, view.markers, params);
     with_hidden(view, on_surface(view, tree, &chm, params.raster_surface_m), &hidden, params)
 }
 
+/// How the canopy height model is made.
+fn model(params: &SegmentationParams) -> PitFree {
+    PitFree {
+        cell_m: params.chm_cell_m,
+        max_edge_m: params.chm_max_edge_m,
+        step_m: params.chm_step_m,
+    }
+}
+
 /// Claims without a thought of hidden trees.
 fn on_surface(view: &View<'_>, tree: &[u32], chm: &Chm, tolerance_m: f64) -> Vec<Claim> {
-    let owner: Vec<Option<u32>> = 
+    let owner: Vec<Option<u32>> =
         chm.top.iter().map(|top| tree.get(*top as usize).copied()).collect();
     let tops = tops(view, tree, chm);
     let claim = |index: usize| {

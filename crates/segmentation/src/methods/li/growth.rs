@@ -38,7 +38,11 @@ impl<'a> Growth<'a> {
     pub(super) fn grow(&mut self, pool: &mut Pool, top: [f64; 2]) -> &[u32] {
         self.gather(pool, top);
         let radius_m = self.params.max_radius_m;
-        self.asked.reset(top.map(|value| value - radius_m), [2.0 * radius_m; 2], self.candidates.len());
+        self.asked.reset(
+            top.map(|value| value - radius_m),
+            [2.0 * radius_m; 2],
+            self.candidates.len(),
+        );
         self.asked.insert(top, TAKEN);
         self.taken.clear();
         for &rank in &self.candidates {

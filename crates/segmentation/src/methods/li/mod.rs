@@ -16,8 +16,6 @@ mod asked;
 mod growth;
 mod maxima;
 mod pool;
-#[cfg(test)]
-mod reference;
 mod segmenter;
 
 pub use segmenter::{Li, grow};
@@ -62,17 +60,17 @@ impl Default for LiParams {
 }
 
 impl LiParams {
-    /// Those named `li_` among the parameters of the stage.
+    /// Those named `li_` among the parameters of the stage; the others, which only [`trees`] needs,
+    /// by default.
     #[must_use]
     pub fn of(params: &SegmentationParams) -> Self {
         Self {
             gap_low_m: params.li_gap_low_m,
             gap_high_m: params.li_gap_high_m,
             split_height_m: params.li_split_height_m,
-            window_m: params.li_window_m,
             max_radius_m: params.li_radius_m,
-            min_top_m: params.li_min_top_m,
             min_height_m: params.min_height_m,
+            ..Self::default()
         }
     }
 
@@ -114,12 +112,7 @@ impl Ranked {
 ///
 /// # Errors
 /// [`Error::Length`] when the slices differ in length.
-pub fn trees(
-    x: &[f64],
-    y: &[f64],
-    height_m: &[f32],
-    params: &LiParams,
-) -> Result<Segments, Error> {
+pub fn trees(x: &[f64], y: &[f64], height_m: &[f32], params: &LiParams) -> Result<Segments, Error> {
     Error::check_lengths(x.len(), &[("y", y.len()), ("height", height_m.len())])?;
     let lowest = params.min_height_m.min(params.min_top_m);
     let ranked = Ranked::new(x, y, height_m, lowest);
@@ -152,7 +145,6 @@ pub fn trees(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use proptest::prelude::*;
 
     type Columns = (Vec<f64>, Vec<f64>, Vec<f32>);
 
@@ -202,25 +194,10 @@ mod tests {
     #[test]
     fn beyond_the_largest_radius_is_another_tree() {
         let x: Vec<f64> = (0..60).map(|i| 0.5 * f64::from(i)).collect();
-        let (y, height) = (vec![0.0; 60], (0..60).map(|i| 30.0 - 0.1 * i as f32).collect::<Vec<_>>());
+        let (y, height) =
+            (vec![0.0; 60], (0..60).map(|i| 30.0 - 0.1 * i as f32).collect::<Vec<_>>());
         let params = LiParams { max_radius_m: 8.0, ..LiParams::default() };
         let found = trees(&x, &y, &height, &params).unwrap();
         assert_eq!(found.tops, [0, 17, 34, 51]);
-    }
-
-    proptest! {
-        #[test]
-        fn the_index_changes_nothing(
-            points in prop::collection::vec((-60i32..60, -60i32..60, 0i32..60), 1..200),
-            window in 0i32..4, radius in 1i32..12,
-        ) {
-            let (x, y, height) = columns(&points);
-            let params = LiParams {
-                window_m: f64::from(window), max_radius_m: f64::from(radius), min_height_m: 1.0,
-                ..LiParams::default()
-            };
-            let found = trees(&x, &y, &height, &params).unwrap();
-            prop_assert_eq!(found, reference::trees(&x, &y, &height, &params));
-        }
     }
 }

@@ -95,15 +95,15 @@ mod tests {
     fn marker(id: u64, x: f64, height_m: f64) -> Marker {
         let apex = [x, 0.0, height_m];
         let (coefficients, tolerance_m) = ([0.0; 2], 0.6);
-        let crown =
-            Crown { id, apex, coefficients, radius_m: 0.0, tolerance_m, oblique: false };
+        let crown = Crown { id, apex, coefficients, radius_m: 0.0, tolerance_m, oblique: false };
         Marker { crown, height_m, score: 1.0 }
     }
 
     /// A ridge of two tops with a point every quarter of a metre, then a gap, then a tree without a
     /// marker.
     fn ridge() -> Piece {
-        let mut piece = Piece { markers: vec![marker(5, 0.0, 20.0), marker(3, 6.0, 18.0)], ..Piece::default() };
+        let mut piece =
+            Piece { markers: vec![marker(5, 0.0, 20.0), marker(3, 6.0, 18.0)], ..Piece::default() };
         for i in -16..80 {
             let x = 0.25 * f64::from(i);
             let height = (20.0 - x.abs()).max(18.0 - (x - 6.0).abs()).max(16.0 - (x - 15.0).abs());
@@ -140,7 +140,7 @@ mod tests {
 
     #[test]
     fn nothing_comes_of_nothing() {
-        assert_eq!(grow(&Piece::default().view(), &LiParams::default()), []);
+        assert!(grow(&Piece::default().view(), &LiParams::default()).is_empty());
         let piece = Piece { markers: Vec::new(), ..ridge() };
         let claims = Li { params: SegmentationParams::default() }.segment(&piece.view()).unwrap();
         assert!(claims.iter().all(|claim| *claim == Claim::default()));
