@@ -24,7 +24,7 @@ fn from_the_top(x: &[f64], y: &[f64], height_m: &[f32], window_m: f64) -> Vec<(u
 }
 
 /// As `methods::li::trees`.
-pub fn trees(x: &[f64], y: &[f64], height_m: &[f32], params: &LiParams) -> Segments {
+pub(crate) fn trees(x: &[f64], y: &[f64], height_m: &[f32], params: &LiParams) -> Segments {
     let at = |i: usize| [x[i], y[i]];
     let height = |i: usize| f64::from(height_m[i]);
     let radius = params.max_radius_m * params.max_radius_m;
