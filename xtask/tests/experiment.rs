@@ -90,3 +90,52 @@ fn a_run_with_known_stems() {
     assert_eq!(found["datasets"][0]["facts"]["dataset"], "quarter");
     assert!(out.join("figure4.png").exists());
 }
+
+const SEGMENTATION_FILES: [&str; 10] = [
+    "report.md",
+    "cases.csv",
+    "trees.csv",
+    "experiment.json",
+    "density.png",
+    "density.svg",
+    "segments.png",
+    "segments.svg",
+    "layers.png",
+    "layers.svg",
+];
+
+#[test]
+fn segmenters_are_compared_the_same_whatever_the_number_of_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |jobs: &str| {
+        let out = folder.path().join(jobs);
+        let small = "experiment segmentation --edge 30 --stands open-conifer,broadleaf --densities 3,8 \
+                     --segmenters starsac,watershed";
+        let mut args: Vec<&str> = small.split_whitespace().collect();
+        args.extend(["--jobs", jobs, "--json", "--out", out.to_str().unwrap()]);
+        let found = json(&args);
+        assert_eq!(found["cases"].as_array().unwrap().len(), 2 * 2 * 2);
+        assert!(found["pooled"][0]["summary"]["all"]["found"].as_u64().unwrap() > 3);
+        SEGMENTATION_FILES.map(|name| std::fs::read(out.join(name)).unwrap())
+    };
+    let (one, three) = (run("1"), run("3"));
+    for (name, (one, three)) in SEGMENTATION_FILES.iter().zip(one.iter().zip(&three)) {
+        assert!(one == three && !one.is_empty(), "{name}");
+    }
+}
+
+#[test]
+fn what_cannot_be_compared_is_named() {
+    let unknown = [
+        (["--stands", "taiga"], "savanna"),
+        (["--segmenters", "magic"], "starsac"),
+        (["--densities", "0"], "density_per_m2"),
+        (["--edge", "1"], "judged_edge_m"),
+    ];
+    for (args, named) in unknown {
+        let output = xtask(&[&["experiment", "segmentation"][..], &args].concat());
+        let message = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{message}");
+        assert!(message.contains(named), "{message}");
+    }
+}

@@ -2,6 +2,7 @@
 
 mod f_figures;
 mod figures;
+mod real;
 mod segmentation;
 
 use super::known::{Filter, Position, as_tree, clusters, read_trees, stems_of_found, trees_of_run};

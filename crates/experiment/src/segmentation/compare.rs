@@ -18,6 +18,8 @@ pub struct Outcome {
     pub case: Case,
     /// Name of the segmenter.
     pub method: &'static str,
+    /// Whether it found the trees itself.
+    pub own_trees: bool,
     /// Points where trees are judged, 1/m².
     pub density_per_m2: f64,
     /// Pulses there, 1/m².
@@ -79,6 +81,7 @@ fn outcome(
     Ok(Outcome {
         case: *case,
         method: method.name,
+        own_trees: method.has_own_trees(),
         density_per_m2: plot.density_per_m2,
         pulses_per_m2: plot.pulses_per_m2,
         summary: Summary::of(&[&judged], &experiment.height_edges_m),
@@ -93,6 +96,8 @@ pub struct Pooled {
     pub case: Case,
     /// Name of the segmenter.
     pub method: &'static str,
+    /// Whether it found the trees itself.
+    pub own_trees: bool,
     /// Mean density of points, 1/m².
     pub density_per_m2: f64,
     /// Mean density of pulses, 1/m².
@@ -128,6 +133,7 @@ fn pooled(outcomes: &[Outcome], first: &Outcome, edges_m: &[f64]) -> Pooled {
     Pooled {
         case: first.case,
         method: first.method,
+        own_trees: first.own_trees,
         density_per_m2: mean(|one| one.density_per_m2),
         pulses_per_m2: mean(|one| one.pulses_per_m2),
         f_range: (!scores.is_empty()).then(|| range(&scores)),

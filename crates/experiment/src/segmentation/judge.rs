@@ -7,6 +7,7 @@ use super::plot::{Plot, TrueTree};
 use crate::Error;
 use serde::Serialize;
 use std::collections::BTreeMap;
+use timberline_crowns::CrownFitParams;
 use timberline_crowns::footprint::footprint;
 use timberline_evaluate::{Layer, Tree, layers, match_trees};
 
@@ -29,7 +30,8 @@ pub struct Hit {
     pub shared_points: usize,
     /// Points of the found tree.
     pub found_points: usize,
-    /// Overlap (intersection over union) of the convex hulls of the found and the true points.
+    /// Overlap (intersection over union) of the convex hulls of the found and the true crown's
+    /// points.
     pub hull_iou: f64,
     /// Overlap of the hull of the found points with the widest section of the true crown.
     pub crown_iou: f64,
@@ -204,8 +206,8 @@ impl Points {
     }
 
     fn hit(&self, plot: &Plot, tree: &TrueTree, found: &FoundTree) -> Hit {
-        let hull = |points: &[u32]| hull(plot, points, tree.top_m);
-        let own = hull(self.of_found(found.id));
+        let hull = |points: &[u32], height_m: f64| crown_hull(plot, points, height_m, tree.top_m);
+        let own = hull(self.of_found(found.id), found.height_m);
         Hit {
             id: found.id,
             top_error_m: distance(tree.top_m, found.top_m),
@@ -213,7 +215,7 @@ impl Points {
             height_error_m: found.height_m - tree.height_m,
             shared_points: self.shared(tree.id, found.id),
             found_points: self.of_found(found.id).len(),
-            hull_iou: iou(&own, &hull(self.of_true(tree.id))),
+            hull_iou: iou(&own, &hull(self.of_true(tree.id), tree.height_m)),
             crown_iou: iou(&own, &tree.outline_m),
         }
     }
@@ -224,11 +226,19 @@ fn distance(a: [f64; 2], b: [f64; 2]) -> f64 {
     (dx * dx + dy * dy).sqrt()
 }
 
-/// Convex hull of points relative to a position in the world.
-fn hull(plot: &Plot, points: &[u32], around_m: [f64; 2]) -> Vec<[f64; 2]> {
+/// Convex hull of a crown relative to a position in the world: of those of its points that are above
+/// a share of its height, as the stage `crown-fit` draws its polygon.
+pub(super) fn crown_hull(
+    plot: &Plot,
+    points: &[u32],
+    height_m: f64,
+    around_m: [f64; 2],
+) -> Vec<[f64; 2]> {
+    let above_m = CrownFitParams::default().polygon_above * height_m;
+    let of_crown = |i: &&u32| f64::from(plot.height_m[**i as usize]) >= above_m;
     let offset = |&i: &u32| {
         let [x, y, _] = plot.cloud.world(i as usize);
         [x - around_m[0], y - around_m[1]]
     };
-    footprint(points.iter().map(offset)).corners
+    footprint(points.iter().filter(of_crown).map(offset)).corners
 }

@@ -91,6 +91,14 @@ pub fn method(name: &str) -> Result<Method, Error> {
 }
 
 impl Method {
+    /// Whether it finds trees itself, instead of taking those of the detection.
+    #[must_use]
+    pub fn has_own_trees(&self) -> bool {
+        match self.how {
+            How::Given(_) => false,
+        }
+    }
+
     /// Segments a plot whose trees were detected.
     ///
     /// # Errors

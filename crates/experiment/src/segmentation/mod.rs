@@ -24,6 +24,7 @@ pub mod method;
 pub mod outline;
 pub mod plan;
 pub mod plot;
+pub mod real;
 pub mod summary;
 pub mod text;
 
@@ -33,4 +34,5 @@ pub use judge::{FoundRow, Hit, Judged, TrueRow, judge};
 pub use method::{FoundTree, Method, Segmented, method, methods};
 pub use plan::{Case, Experiment, StandKind};
 pub use plot::{Plot, TrueTree};
+pub use real::{BoxRow, BoxedScan, Clip, ClipRow};
 pub use summary::Summary;

@@ -95,6 +95,34 @@ impl Plot {
         Self { height_m, is_first, label, trees, judged, density_per_m2, pulses_per_m2, cloud }
     }
 
+    /// A real scan whose trees are not known but for what labels say; all of it is judged. Points
+    /// are brought into canonical order, with their heights and labels.
+    ///
+    /// # Errors
+    /// [`Error::Length`].
+    pub fn measured(cloud: &PointCloud, height_m: &[f32], label: &[u64]) -> Result<Self, Error> {
+        let points = cloud.len();
+        for (column, found) in [("height", height_m.len()), ("label", label.len())] {
+            if found != points {
+                return Err(Error::Length { column, points, found });
+            }
+        }
+        let order = order::canonical_order(cloud);
+        let cloud = cloud.select(&order);
+        let judged = cloud.bounds().rect();
+        let [width, height] = judged.size();
+        Ok(Self {
+            height_m: order.iter().map(|&i| height_m[i as usize]).collect(),
+            is_first: cloud.return_number.iter().map(|number| *number <= 1).collect(),
+            label: order.iter().map(|&i| label[i as usize]).collect(),
+            trees: Vec::new(),
+            judged,
+            density_per_m2: cloud.len() as f64 / (width * height),
+            pulses_per_m2: f64::NAN,
+            cloud,
+        })
+    }
+
     /// Whether a position is judged.
     #[must_use]
     pub fn is_judged(&self, [x, y]: [f64; 2]) -> bool {

@@ -12,6 +12,9 @@ pub struct Summary {
     /// Trees with nothing above their tops: found trees that are hidden ones count neither for nor
     /// against.
     pub visible: Accuracy,
+    /// Trees of which at least half was gathered: those found whose points overlap the true ones by
+    /// an intersection over union of [`HALF`] or more.
+    pub segments: Accuracy,
     /// By class of height: true trees by their height, found ones by theirs.
     pub by_height: Vec<Accuracy>,
     /// By canopy layer: true trees among the true ones, found trees among the found ones.
@@ -37,6 +40,10 @@ pub struct Summary {
     pub point_completeness: Option<f64>,
 }
 
+/// Overlap of points from which a segment holds its tree, as is usual for segments of instances
+/// (Kirillov et al. 2019, Panoptic segmentation, section 4.1).
+pub const HALF: f64 = 0.5;
+
 /// Layers in the sequence of the tables.
 pub const LAYERS: [Layer; 3] = [Layer::Upper, Layer::Middle, Layer::Lower];
 
@@ -55,6 +62,7 @@ impl Summary {
         Self {
             all: group("all", &trees, &found, |_| true, |_| true),
             visible: group("visible", &trees, &found, |tree| tree.visible, is_not_hidden),
+            segments: segments(&hits, trees.len(), found.len()),
             by_height: by_height(&trees, &found, edges_m),
             by_layer: by_layer(&trees, &found),
             top_error_m: errors(|hit| hit.top_error_m),
@@ -68,6 +76,15 @@ impl Summary {
             point_completeness: share(gathered, trees.iter().map(|tree| tree.points).sum()),
         }
     }
+}
+
+fn segments(hits: &[(&TrueRow, &Hit)], reference: usize, detected: usize) -> Accuracy {
+    let overlap = |(tree, hit): &(&TrueRow, &Hit)| {
+        ratio(hit.shared_points, tree.points + hit.found_points - hit.shared_points)
+    };
+    let held = hits.iter().filter(|hit| overlap(hit) >= HALF).count();
+    let group = "segments".to_owned();
+    Accuracy { group, reference, found: held, detected: Some(detected), correct: held }
 }
 
 fn is_not_hidden(tree: &FoundRow) -> bool {
@@ -196,6 +213,7 @@ mod tests {
         let recalls: Vec<_> = summary.by_height.iter().map(Accuracy::recall).collect();
         assert_eq!(recalls, [Some(1.0), None, Some(0.5)]);
         assert_eq!(summary.by_layer[0].recall(), Some(0.5));
+        assert_eq!(summary.segments.found, 0, "40 of 140 points");
         assert_eq!(summary.point_purity, Some(80.0 / 240.0));
         assert_eq!(summary.point_completeness, Some(80.0 / 300.0));
         assert_eq!(summary.tree_purity, Some(0.5));

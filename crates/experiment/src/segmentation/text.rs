@@ -4,9 +4,10 @@ use super::compare::{Outcome, Pooled};
 use super::judge::{FoundRow, TrueRow};
 use super::method::methods;
 use super::plan::Experiment;
+use super::real::{BoxRow, ClipRow};
 use super::summary::{LAYERS, Summary, class_names};
 use std::fmt::Write as _;
-use timberline_evaluate::{Accuracy, Layer, MatchRule};
+use timberline_evaluate::{Accuracy, ErrorStats, Layer, MatchRule};
 
 /// One line for every case and segmenter; lengths in metres.
 #[must_use]
@@ -31,8 +32,8 @@ pub fn cases_csv(outcomes: &[Outcome]) -> String {
         let summary = &outcome.summary;
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{head},{},{}", accuracy(&summary.all), errors(summary));
-        let groups = std::iter::once(&summary.visible);
-        for group in groups.chain(&summary.by_height).chain(&summary.by_layer) {
+        let groups = [&summary.visible, &summary.segments];
+        for group in groups.into_iter().chain(&summary.by_height).chain(&summary.by_layer) {
             let _ = writeln!(text, "{head},{}{}", accuracy(group), ",".repeat(12));
         }
     }
@@ -160,24 +161,51 @@ fn three(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), |value| format!("{value:.3}"))
 }
 
-/// The whole report on generated stands.
+/// The report on generated stands.
 #[must_use]
 pub fn markdown(experiment: &Experiment, pooled: &[Pooled]) -> String {
     let mut text = String::from("# Segmenters compared\n\n");
     text += &introduction(experiment);
+    let found = tree_sets(pooled);
     text += "\n## Trees\n\n";
-    text += &trees(pooled);
+    text += &trees(&found);
     text += "\n## Errors of the trees found\n\n";
-    text += &errors_table(pooled);
+    text += &errors_table(&found);
     text += "\n## By class of height: F (true trees)\n\n";
     let classes = class_names(&experiment.height_edges_m);
-    text += &groups(pooled, &classes, |summary| &summary.by_height);
+    text += &groups(&found, &classes, |summary| &summary.by_height);
     text += "\n## By canopy layer: F (true trees)\n\n";
     let layers: Vec<String> = LAYERS.iter().map(ToString::to_string).collect();
-    text += &groups(pooled, &layers, |summary| &summary.by_layer);
+    text += &groups(&found, &layers, |summary| &summary.by_layer);
     text += "\n## Points and crowns\n\n";
+    text += POINTS;
     text += &points(pooled);
     text
+}
+
+/// What the columns of the last table are.
+const POINTS: &str = "Points from 1 m above the ground on. *Segments*: F of trees of which a segment holds half \
+    (intersection over union of the points from 0.5 on). Of all points: those of false and of missed trees count, \
+    too; of a tree: means over the trees found. *Hulls*: mean overlap of the convex hulls of the found and the true \
+    crown's points; *true crown*: with the widest section of the crown's envelope, which neighbours may reach into. \
+    A crown's points are those above 0.3 of its height.\n\n";
+
+/// What finds the trees of the segmenters that do not themselves.
+pub const DETECTION: &str = "detection";
+
+/// A row for every set of trees: that of the detection under its own name, whatever the segmenters
+/// that took it over.
+#[must_use]
+pub fn tree_sets(pooled: &[Pooled]) -> Vec<Pooled> {
+    let mut rows: Vec<Pooled> = Vec::new();
+    for one in pooled {
+        let method = if one.own_trees { one.method } else { DETECTION };
+        let same = |row: &Pooled| row.case == one.case && row.method == method;
+        if !rows.iter().any(same) {
+            rows.push(Pooled { method, ..one.clone() });
+        }
+    }
+    rows
 }
 
 fn introduction(experiment: &Experiment) -> String {
@@ -219,7 +247,7 @@ fn head(pooled: &Pooled) -> Vec<String> {
 fn trees(pooled: &[Pooled]) -> String {
     let heading = [
         "stand",
-        "segmenter",
+        "trees of",
         "points/m²",
         "pulses/m²",
         "true trees",
@@ -253,7 +281,7 @@ fn trees(pooled: &[Pooled]) -> String {
 fn errors_table(pooled: &[Pooled]) -> String {
     let heading = [
         "stand",
-        "segmenter",
+        "trees of",
         "points/m²",
         "top, RMSE m",
         "top, median m",
@@ -276,7 +304,7 @@ fn errors_table(pooled: &[Pooled]) -> String {
 }
 
 fn groups(pooled: &[Pooled], names: &[String], of: impl Fn(&Summary) -> &Vec<Accuracy>) -> String {
-    let mut heading = vec!["stand", "segmenter", "points/m²"];
+    let mut heading = vec!["stand", "trees of", "points/m²"];
     heading.extend(names.iter().map(String::as_str));
     let mut table = Table::new(&heading, 2);
     for one in pooled {
@@ -295,6 +323,7 @@ fn points(pooled: &[Pooled]) -> String {
         "stand",
         "segmenter",
         "points/m²",
+        "F of segments",
         "purity of all points",
         "completeness of all points",
         "purity of a tree",
@@ -306,6 +335,7 @@ fn points(pooled: &[Pooled]) -> String {
     for one in pooled {
         let summary = &one.summary;
         let values = [
+            summary.segments.f_score(),
             summary.point_purity,
             summary.point_completeness,
             summary.tree_purity,
@@ -318,4 +348,127 @@ fn points(pooled: &[Pooled]) -> String {
         table.row(cells);
     }
     table.0
+}
+
+/// The report on real scans, without a heading of its own; nothing without scans.
+#[must_use]
+pub fn real_markdown(boxes: &[BoxRow], clips: &[ClipRow]) -> String {
+    let mut text = String::new();
+    if !boxes.is_empty() {
+        text += "\n## Crowns drawn by hand\n\n";
+        text += BOXES;
+        text += &boxes_table(boxes);
+    }
+    if !clips.is_empty() {
+        text += "\n## Measured single trees\n\n";
+        text += CLIPS;
+        text += &clips_table(clips);
+    }
+    text
+}
+
+const BOXES: &str = "A tree's box is that around its crown's points; it is a drawn one when they overlap by 0.4 or more \
+    (intersection over union). Points from 1 m above the ground on: *purity* of those in boxes and trees, \
+    *completeness* of those in boxes, and the share of the trees' points that is *in boxes*.\n\n";
+
+const CLIPS: &str = "The tree of a clip is the found one nearest to the measured top, within 2 m. Right is a height within 1 m and \
+    a crown's diameter (of the circle with the area of its polygon) within 20 % of what was measured; clips without a tree \
+    count as wrong.\n\n";
+
+fn boxes_table(rows: &[BoxRow]) -> String {
+    let heading = [
+        "scan",
+        "segmenter",
+        "boxes",
+        "trees",
+        "matched",
+        "recall",
+        "precision",
+        "mean IoU",
+        "purity",
+        "completeness",
+        "in boxes",
+    ];
+    let mut table = Table::new(&heading, 2);
+    for row in rows {
+        let shares = [row.recall, row.precision, row.mean_iou, Some(row.purity)];
+        let mut cells = vec![row.scan.clone(), row.method.to_owned()];
+        cells.extend([row.boxes, row.found, row.matched].map(|count| count.to_string()));
+        cells.extend(shares.map(three));
+        cells.extend([row.completeness, row.in_boxes].map(|share| three(Some(share))));
+        table.row(cells);
+    }
+    table.0
+}
+
+fn clips_table(rows: &[ClipRow]) -> String {
+    let heading = [
+        "segmenter",
+        "clips",
+        "found",
+        "height right",
+        "diameter right",
+        "both right",
+        "height, bias m",
+        "height, RMSE m",
+        "diameter, median ratio",
+        "trees in all clips",
+    ];
+    let mut names: Vec<&str> = Vec::new();
+    for row in rows {
+        if !names.contains(&row.method) {
+            names.push(row.method);
+        }
+    }
+    let mut table = Table::new(&heading, 1);
+    for name in names {
+        let own: Vec<&ClipRow> = rows.iter().filter(|row| row.method == name).collect();
+        table.row(clip_cells(name, &own));
+    }
+    table.0
+}
+
+fn clip_cells(name: &str, rows: &[&ClipRow]) -> Vec<String> {
+    let count = |is: &dyn Fn(&ClipRow) -> bool| rows.iter().filter(|row| is(row)).count();
+    let of = |right: usize| format!("{right} ({:.0} %)", 100.0 * right as f64 / rows.len() as f64);
+    let height = rows.iter().filter_map(|row| Some(row.found_height_m? - row.height_m));
+    let height = ErrorStats::of(height);
+    let ratio = rows.iter().filter_map(|row| Some(row.found_diameter_m? / row.crown_diameter_m));
+    let both = count(&|row| row.height_is_right() && row.diameter_is_right());
+    vec![
+        name.to_owned(),
+        rows.len().to_string(),
+        count(&|row| row.distance_m.is_some()).to_string(),
+        of(count(&ClipRow::height_is_right)),
+        of(count(&ClipRow::diameter_is_right)),
+        of(both),
+        format!("{:.3}", height.bias),
+        format!("{:.3}", height.rmse),
+        format!("{:.3}", ErrorStats::of(ratio).median),
+        rows.iter().map(|row| row.trees).sum::<usize>().to_string(),
+    ]
+}
+
+/// One line for every clip and segmenter; lengths in metres.
+#[must_use]
+pub fn clips_csv(rows: &[ClipRow]) -> String {
+    let mut text = String::from(
+        "clip,segmenter,height_m,crown_diameter_m,trees,distance_m,found_height_m,found_diameter_m\n",
+    );
+    let number = |value: Option<f64>| value.map(|value| format!("{value:.3}")).unwrap_or_default();
+    for row in rows {
+        let found = [row.distance_m, row.found_height_m, row.found_diameter_m].map(number);
+        // Writing to a String cannot fail.
+        let _ = writeln!(
+            text,
+            "{},{},{:.3},{:.3},{},{}",
+            row.clip.replace([',', '\n', '"'], " "),
+            row.method,
+            row.height_m,
+            row.crown_diameter_m,
+            row.trees,
+            found.join(",")
+        );
+    }
+    text
 }

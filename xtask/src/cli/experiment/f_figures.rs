@@ -19,11 +19,30 @@ const COLOURS: [Rgb; 7] = [
 const USUAL_DENSITY_PER_M2: f64 = 10.0;
 
 /// F of all trees over the density of points: a panel for every kind of stand, a curve for every
-/// segmenter. The axis is logarithmic.
-pub(super) fn density(experiment: &Experiment, pooled: &[Pooled]) -> Chart {
+/// set of trees. The axis is logarithmic.
+pub(super) fn density(experiment: &Experiment, trees: &[Pooled]) -> Chart {
+    let note = "All true trees from 2 m of height on, seen from above or not.";
+    over_density(experiment, trees, "Trees found, F", note, |one| one.summary.all.f_score())
+}
+
+/// F of segments over the density of points: a panel for every kind of stand, a curve for every
+/// segmenter.
+pub(super) fn segments(experiment: &Experiment, pooled: &[Pooled]) -> Chart {
+    let note =
+        "Trees of which a segment holds half: intersection over union of the points from 0.5 on.";
+    let title = "Trees held by segments, F";
+    over_density(experiment, pooled, title, note, |one| one.summary.segments.f_score())
+}
+
+fn over_density(
+    experiment: &Experiment,
+    pooled: &[Pooled],
+    title: &str,
+    note: &str,
+    value: impl Fn(&Pooled) -> Option<f64>,
+) -> Chart {
     let x = density_axis(&experiment.densities_per_m2);
-    let place =
-        |one: &Pooled| Some([libm::log10(one.case.density_per_m2), one.summary.all.f_score()?]);
+    let place = |one: &Pooled| Some([libm::log10(one.case.density_per_m2), value(one)?]);
     let panel = |&stand: &StandKind| {
         let own: Vec<&Pooled> = pooled.iter().filter(|one| one.case.stand == stand).collect();
         Panel {
@@ -35,11 +54,11 @@ pub(super) fn density(experiment: &Experiment, pooled: &[Pooled]) -> Chart {
         }
     };
     Chart {
-        title: "Trees found, F".to_owned(),
+        title: title.to_owned(),
         panels: experiment.stands.iter().map(panel).collect(),
         columns: 3,
         panel_px: [720, 620],
-        note: "All true trees from 2 m of height on, seen from above or not.".to_owned(),
+        note: note.to_owned(),
     }
 }
 

@@ -1,12 +1,13 @@
 //! `experiment segmentation`: all segmenters on generated stands.
 
-use super::{bar, f_figures};
+use super::{bar, f_figures, real};
 use crate::cli::{DONE, Usage, out};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
 use timberline_artefact::publish::write_atomic;
 use timberline_experiment::segmentation::{
-    Chain, Experiment, Method, Outcome, Pooled, StandKind, compare, method, methods, pool, text,
+    BoxRow, Chain, ClipRow, Experiment, Method, Outcome, Pooled, StandKind, compare, method,
+    methods, pool, real as real_scans, text,
 };
 
 /// Arguments of `experiment segmentation`.
@@ -15,12 +16,14 @@ use timberline_experiment::segmentation::{
     after_help = "Stands are grown and scanned, trees are found by the airborne chain with its default parameters, and every \
     segmenter gives the points their trees; trees and points are compared with the truth.\n\n\
     Files in the output folder:\n  \
-    report.md        recall, precision, F, errors, points and crowns by stand, segmenter and density\n  \
-    cases.csv        lines for every case and segmenter: all trees, visible ones, classes of height, layers\n  \
-    trees.csv        a line for every true tree and every false one, for every case and segmenter\n  \
-    experiment.json  all parameters and figures\n  \
-    density.png, .svg   F over density for every kind of stand and segmenter\n  \
-    layers.png, .svg    F by canopy layer, at the density nearest to 10 points per square metre\n\n\
+    report.md           recall, precision, F, errors, points and crowns by stand, segmenter and density\n  \
+    cases.csv           lines for every case and segmenter: all trees, visible ones, classes of height, layers\n  \
+    trees.csv           a line for every true tree and every false one, for every case and segmenter\n  \
+    experiment.json     all parameters and figures\n  \
+    density.png, .svg   F of trees over density, for every kind of stand\n  \
+    segments.png, .svg  F of segments over density, for every kind of stand and segmenter\n  \
+    layers.png, .svg    F of trees by canopy layer, at the density nearest to 10 points per square metre\n  \
+    clips.csv           a line for every measured tree and segmenter, with --data\n\n\
     The same arguments give the same bytes, whatever the number of threads."
 )]
 pub(super) struct Args {
@@ -45,6 +48,9 @@ pub(super) struct Args {
     /// Slope of the ground, degrees
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     slope: f64,
+    /// Folder of real scans with truth, of which als/neon_SJER_052 and uas_treeclips are read
+    #[arg(long, value_name = "DIR")]
+    data: Option<PathBuf>,
     /// Folder to write to
     #[arg(long, value_name = "DIR", default_value = "target/experiment-segmentation")]
     out: PathBuf,
@@ -72,18 +78,17 @@ pub(super) fn run(args: &Args) -> Result<u8> {
     let outcomes =
         pool_of_threads.install(|| compare(&experiment, &chain, &methods, &|| bar.inc(1)))?;
     bar.finish_and_clear();
+    let (boxes, clips) = match &args.data {
+        Some(data) => pool_of_threads.install(|| on_real_scans(data, &chain, &methods))?,
+        None => Default::default(),
+    };
     let pooled = pool(&outcomes, &experiment.height_edges_m);
-    let json = serde_json::json!({
-        "experiment": experiment,
-        "chain": chain,
-        "cases": outcomes,
-        "pooled": pooled,
-    });
-    write(&args.out, &experiment, &outcomes, &pooled, &json)?;
+    let found = Found { experiment, chain, outcomes, pooled, boxes, clips };
+    found.write(&args.out)?;
     if args.json {
-        out::json(&json)?;
+        out::json(&found.json())?;
     } else {
-        out::raw(text::markdown(&experiment, &pooled).as_bytes());
+        out::raw(found.report().as_bytes());
         out::talk(&format!("written to {}", args.out.display()));
     }
     Ok(DONE)
@@ -113,34 +118,72 @@ fn segmenters(names: &[String]) -> Result<Vec<Method>> {
     Ok(chosen.map_err(|error| Usage(error.to_string()))?)
 }
 
-/// The end of the report.
-const FIGURES: &str =
-    "\n## Figures\n\n![F over density](density.png)\n\n![F by canopy layer](layers.png)\n";
-
-fn write(
+fn on_real_scans(
     folder: &Path,
-    experiment: &Experiment,
-    outcomes: &[Outcome],
-    pooled: &[Pooled],
-    json: &serde_json::Value,
-) -> Result<()> {
-    std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
-    let files = [
-        ("report.md", text::markdown(experiment, pooled) + FIGURES),
-        ("cases.csv", text::cases_csv(outcomes)),
-        ("trees.csv", text::trees_csv(outcomes)),
-        ("experiment.json", serde_json::to_string_pretty(json)? + "\n"),
-    ];
-    for (name, text) in files {
-        write_atomic(&folder.join(name), text.as_bytes())?;
+    chain: &Chain,
+    methods: &[Method],
+) -> Result<(Vec<BoxRow>, Vec<ClipRow>)> {
+    let (boxed, clips) = real::read(folder)?;
+    out::talk(&format!("{} scan(s) with boxes, {} measured trees", boxed.len(), clips.len()));
+    let boxes = real_scans::boxes(&boxed, chain, methods)?;
+    Ok((boxes, real_scans::clips(&clips, chain, methods)?))
+}
+
+/// All that was found.
+struct Found {
+    experiment: Experiment,
+    chain: Chain,
+    outcomes: Vec<Outcome>,
+    pooled: Vec<Pooled>,
+    boxes: Vec<BoxRow>,
+    clips: Vec<ClipRow>,
+}
+
+/// The end of the report.
+const FIGURES: &str = "\n## Figures\n\n![F of trees over density](density.png)\n\n\
+    ![F of segments over density](segments.png)\n\n![F by canopy layer](layers.png)\n";
+
+impl Found {
+    fn report(&self) -> String {
+        let generated = text::markdown(&self.experiment, &self.pooled);
+        generated + &text::real_markdown(&self.boxes, &self.clips)
     }
-    let charts = [
-        ("density", f_figures::density(experiment, pooled)),
-        ("layers", f_figures::layers(experiment, pooled)),
-    ];
-    for (name, chart) in charts {
-        chart.write_png(&folder.join(format!("{name}.png")))?;
-        write_atomic(&folder.join(format!("{name}.svg")), chart.svg()?.as_bytes())?;
+
+    fn json(&self) -> serde_json::Value {
+        serde_json::json!({
+            "experiment": self.experiment,
+            "chain": self.chain,
+            "cases": self.outcomes,
+            "pooled": self.pooled,
+            "boxes": self.boxes,
+            "clips": self.clips,
+        })
     }
-    Ok(())
+
+    fn write(&self, folder: &Path) -> Result<()> {
+        std::fs::create_dir_all(folder).with_context(|| folder.display().to_string())?;
+        let mut files = vec![
+            ("report.md", self.report() + FIGURES),
+            ("cases.csv", text::cases_csv(&self.outcomes)),
+            ("trees.csv", text::trees_csv(&self.outcomes)),
+            ("experiment.json", serde_json::to_string_pretty(&self.json())? + "\n"),
+        ];
+        if !self.clips.is_empty() {
+            files.push(("clips.csv", text::clips_csv(&self.clips)));
+        }
+        for (name, text) in files {
+            write_atomic(&folder.join(name), text.as_bytes())?;
+        }
+        let (experiment, trees) = (&self.experiment, text::tree_sets(&self.pooled));
+        let charts = [
+            ("density", f_figures::density(experiment, &trees)),
+            ("segments", f_figures::segments(experiment, &self.pooled)),
+            ("layers", f_figures::layers(experiment, &trees)),
+        ];
+        for (name, chart) in charts {
+            chart.write_png(&folder.join(format!("{name}.png")))?;
+            write_atomic(&folder.join(format!("{name}.svg")), chart.svg()?.as_bytes())?;
+        }
+        Ok(())
+    }
 }
