@@ -4,7 +4,8 @@ use super::chain::view;
 use super::plot::Plot;
 use crate::Error;
 use timberline_segmentation::{
-    Claim, Marker, SegmentMethod, SegmentationParams, View, segment_in_blocks, segmenter,
+    Claim, LiParams, Marker, SegmentMethod, SegmentationParams, Segments, View, methods::li,
+    segment_in_blocks, segmenter,
 };
 
 /// A tree found, with its position in the world and the height of its top above ground, m.
@@ -41,12 +42,17 @@ pub struct Method {
 enum How {
     /// Points for the trees of the detection, as the stage `segmentation` does it.
     Given(SegmentMethod),
+    /// Trees of its own, on the whole plot at once.
+    Own(Find),
 }
+
+type Find = fn(&View<'_>) -> Result<Segments, timberline_segmentation::Error>;
 
 /// All ways to segment, in the sequence of the tables.
 #[must_use]
 pub fn methods() -> Vec<Method> {
     let given = |method, name, about| Method { name, about, how: How::Given(method) };
+    let own = |find: Find, name, about| Method { name, about, how: How::Own(find) };
     vec![
         given(
             SegmentMethod::Starsac,
@@ -73,6 +79,11 @@ pub fn methods() -> Vec<Method> {
             "li",
             "growing from the top down by spacing in the plane (Li et al. 2012)",
         ),
+        own(
+            |view| li::trees(view.x, view.y, view.height_m, &LiParams::default()),
+            "li-own",
+            "the same with the paper's parameters, which finds its trees itself",
+        ),
     ]
 }
 
@@ -96,6 +107,7 @@ impl Method {
     pub fn has_own_trees(&self) -> bool {
         match self.how {
             How::Given(_) => false,
+            How::Own(_) => true,
         }
     }
 
@@ -109,6 +121,7 @@ impl Method {
                 let claims = segmented_as_given(&view(plot, markers), method)?;
                 Ok(Segmented { trees: given(plot, markers), claims })
             }
+            How::Own(find) => Ok(own_trees(plot, &find(&view(plot, markers))?)),
         }
     }
 }
@@ -129,4 +142,21 @@ fn given(plot: &Plot, markers: &[Marker]) -> Vec<FoundTree> {
         FoundTree { id: marker.crown.id, top_m: [x, y], height_m: marker.height_m }
     };
     markers.iter().map(tree).collect()
+}
+
+/// Trees and claims of a segmenter that found the trees: ids count from 1, and whether a point is on
+/// the surface is not said.
+fn own_trees(plot: &Plot, found: &Segments) -> Segmented {
+    let tree = |(label, &top): (u64, &u32)| {
+        let [x, y, _] = plot.cloud.world(top as usize);
+        FoundTree { id: label, top_m: [x, y], height_m: f64::from(plot.height_m[top as usize]) }
+    };
+    let claim = |&label: &u32| match label {
+        Segments::NONE => Claim::default(),
+        label => Claim { id: u64::from(label) + 1, score: 0.5 },
+    };
+    Segmented {
+        trees: (1..).zip(&found.tops).map(tree).collect(),
+        claims: found.tree.iter().map(claim).collect(),
+    }
 }
