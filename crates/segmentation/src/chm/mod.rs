@@ -66,25 +66,29 @@ impl Chm {
     /// above 0 without long triangles. So the pulses that went deep into a crown leave no hole, and
     /// neither are gaps between trees bridged.
     ///
-    /// Where the points are denser than a lattice of half a cell, the highest first return of each of
-    /// its cells stands for the others, as is usual before this method (Isenburg 2014). Cells outside
-    /// the triangulation have the height of their highest point.
+    /// The highest first return of a cell stands for all in it, as is usual before this method
+    /// (Isenburg 2014). Cells outside the triangulation have the height of their highest point.
     ///
     /// # Errors
     /// As [`Chm::highest`]; [`Error::Triangulation`] for coordinates that are not finite.
     pub fn pit_free(view: &View<'_>, how: &PitFree) -> Result<Self, Error> {
         let mut chm = Self::highest(view, how.cell_m)?;
         let highest = std::mem::replace(&mut chm.height_m, vec![f32::NAN; chm.window.len()]);
-        let mut vertices = thinned(view, how.cell_m / 2.0)?;
+        let mut vertices = thinned(view, how.cell_m)?;
         let top_m = vertices.iter().fold(0.0, |top, vertex| f64::max(top, vertex[2]));
-        for level_m in levels(how.step_m, top_m) {
-            vertices.retain(|vertex| vertex[2] >= level_m);
+        let mut tin = tin::Tin::new();
+        // From the top, so that every surface is the one above with more vertices.
+        for level_m in levels(how.step_m, top_m).into_iter().rev() {
+            let (above, below) = vertices.into_iter().partition(|vertex| vertex[2] >= level_m);
+            vertices = below;
+            let above: Vec<[f64; 3]> = above;
+            tin.add(&above)?;
             let longest_m = if level_m > 0.0 { how.max_edge_m } else { f64::INFINITY };
-            tin::each_triangle(&vertices, |corners| {
+            tin.each_triangle(|corners| {
                 if tin::longest_squared(&corners) <= longest_m * longest_m {
                     chm.raise(corners);
                 }
-            })?;
+            });
         }
         let gaps = chm.height_m.iter_mut().zip(highest).filter(|(height, _)| height.is_nan());
         gaps.for_each(|(height, highest)| *height = highest);

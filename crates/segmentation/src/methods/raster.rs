@@ -33,9 +33,10 @@ pub struct RasterSegmenter {
 }
 
 impl Segmenter for RasterSegmenter {
-    /// A crown, and those it meets.
+    /// All trees that may have a point, which are within a radius, and half a radius of the forest
+    /// around them.
     fn reach_m(&self) -> f64 {
-        (2.0 * self.params.raster_radius_m).max(self.params.reach_m)
+        (1.5 * self.params.raster_radius_m).max(self.params.reach_m)
     }
 
     fn segment(&self, view: &View<'_>) -> Result<Vec<Claim>, Error> {
