@@ -36,10 +36,12 @@ fn points() -> Vec<[f64; 3]> {
     points
 }
 
-/// Crowns of several sizes and shapes in a row that crosses tiles; every fifth is rejected.
+/// Crowns of several sizes and shapes in a row that crosses tiles; every fifth is rejected, every
+/// seventh stands deep below the others' echoes.
 fn models() -> Vec<CrownModel> {
     let model = |i: u32| {
-        let apex = [4.3 * f64::from(i) + 2.1, 9.0 + f64::from(i % 3), 13.0 + f64::from(i % 4)];
+        let top_m = if i % 7 == 6 { 6.5 } else { 13.0 + f64::from(i % 4) };
+        let apex = [4.3 * f64::from(i) + 2.1, 9.0 + f64::from(i % 3), top_m];
         let apex_m = [0, 1, 2].map(|axis| quantise(CORNER[axis] + apex[axis]));
         let (shape, parameters) = match i % 4 {
             0 => (CrownShape::Mixed, [0.8, 0.3]),
@@ -114,6 +116,10 @@ fn labels_do_not_depend_on_the_tiles() {
         assert_eq!(whole.len(), 90 * 30 * 12);
         let labelled = whole.values().filter(|(tree, _)| *tree != 0).count();
         assert!(labelled > 2000, "{method:?}: {labelled}");
+        for model in models().iter().skip(6).step_by(7) {
+            let points = whole.values().filter(|(tree, _)| *tree == model.id).count();
+            assert!(points > 10, "{method:?}: {points} points of a tree below the canopy");
+        }
         for (edge, origin) in [(16, [0, 0]), (32, [5, 9]), (64, [32, 0])] {
             let tiled = run_with(TileGrid::new(edge, origin).unwrap(), &params);
             assert!(tiled == whole, "{method:?}: tiles of {edge} m");

@@ -247,3 +247,126 @@ fn levels(step_m: f64, top_m: f64) -> Vec<f64> {
 
 /// Lowest of the layers that are a step apart, m.
 const FIRST_STEP_M: f64 = 5.0;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Piece;
+    use proptest::prelude::*;
+
+    const HOW: PitFree = PitFree { cell_m: 0.5, max_edge_m: 1.5, step_m: 5.0 };
+
+    /// First returns at positions with heights; elevations do not matter.
+    fn piece(points: &[[f64; 3]], frame: Frame) -> Piece {
+        let local: Vec<[f64; 3]> = points.iter().map(|p| frame.local_from_world(*p)).collect();
+        Piece {
+            frame,
+            x: local.iter().map(|p| p[0]).collect(),
+            y: local.iter().map(|p| p[1]).collect(),
+            z: vec![0.0; points.len()],
+            height_m: points.iter().map(|p| p[2] as f32).collect(),
+            is_first: vec![true; points.len()],
+            markers: Vec::new(),
+        }
+    }
+
+    /// A point in the middle of every cell of a square of 10 m.
+    fn plate(height_m: impl Fn(i32, i32) -> f64) -> Vec<[f64; 3]> {
+        let place = |i: i32, j: i32| [f64::from(i) * 0.5 + 0.25, f64::from(j) * 0.5 + 0.25];
+        let cells = (0..20).flat_map(|i| (0..20).map(move |j| (i, j)));
+        cells.map(|(i, j)| [place(i, j)[0], place(i, j)[1], height_m(i, j)]).collect()
+    }
+
+    #[test]
+    fn the_highest_point_of_a_cell_and_of_equal_ones_the_first() {
+        let mut points = vec![[0.1, 0.1, 3.0], [0.2, 0.3, 7.0], [0.3, 0.2, 7.0], [1.2, 0.1, -0.5]];
+        points.push([0.1, 0.7, f64::NAN]);
+        let piece = piece(&points, Frame::default());
+        let chm = Chm::highest(&piece.view(), 0.5).unwrap();
+        assert_eq!(chm.window, Window { column0: 0, row0: 0, columns: 3, rows: 2 });
+        assert_eq!((chm.height_m[0], chm.top[0]), (7.0, 1));
+        assert_eq!((chm.height_m[2].to_bits(), chm.top[2]), (0, 3), "below ground");
+        assert!(chm.height_m[3].is_nan() && chm.top[3] == Chm::NO_POINT, "height unknown");
+    }
+
+    #[test]
+    fn a_pulse_deep_into_a_crown_leaves_no_pit() {
+        let points = plate(|i, j| if (i, j) == (8, 8) { 1.0 } else { 12.0 });
+        let piece = piece(&points, Frame::default());
+        let (raw, free) = (Chm::highest(&piece.view(), 0.5), Chm::pit_free(&piece.view(), &HOW));
+        let (raw, free) = (raw.unwrap(), free.unwrap());
+        let cell = free.cell_at(4.25, 4.25).unwrap();
+        assert_eq!((raw.height_m[cell], free.height_m[cell]), (1.0, 12.0));
+    }
+
+    #[test]
+    fn a_gap_between_crowns_stays_open() {
+        let piece =
+            piece(&plate(|i, _| if (6..14).contains(&i) { 0.0 } else { 12.0 }), Frame::default());
+        let free = Chm::pit_free(&piece.view(), &HOW).unwrap();
+        assert_eq!(free.height_m[free.cell_at(5.1, 5.1).unwrap()], 0.0);
+        assert_eq!(free.height_m[free.cell_at(2.1, 5.1).unwrap()], 12.0);
+    }
+
+    #[test]
+    fn later_returns_do_not_count_unless_there_are_no_others() {
+        let mut piece = piece(&plate(|_, _| 8.0), Frame::default());
+        piece.is_first.iter_mut().step_by(3).for_each(|first| *first = false);
+        piece.height_m.iter_mut().step_by(3).for_each(|height| *height = 2.5);
+        let middle = |piece: &Piece| {
+            let chm = Chm::pit_free(&piece.view(), &HOW).unwrap();
+            (0..4)
+                .map(|i| chm.height_m[chm.cell_at(4.1 + 0.5 * f64::from(i), 5.1).unwrap()])
+                .collect::<Vec<_>>()
+        };
+        assert_eq!(middle(&piece), [8.0; 4]);
+        piece.is_first.fill(false);
+        assert!(middle(&piece).iter().all(|height| *height <= 8.0));
+        assert_eq!(
+            Chm::pit_free(&Piece::default().view(), &HOW).unwrap().height_m,
+            Vec::<f32>::new()
+        );
+    }
+
+    #[test]
+    fn the_surface_is_the_plane_and_ends_where_cells_do_not_join() {
+        let piece =
+            piece(&plate(|i, j| 3.0 + 0.5 * f64::from(i) + 0.25 * f64::from(j)), Frame::default());
+        let chm = Chm::highest(&piece.view(), 0.5).unwrap();
+        let [height_m, slope] = chm.surface(4.4, 5.3, |_| true).unwrap();
+        let expected = 3.0 + (4.4 - 0.25) + 0.5 * (5.3 - 0.25);
+        assert!((height_m - expected).abs() < 1e-6, "{height_m}");
+        assert!((slope - 1.25).abs() < 1e-9, "{slope}");
+        let own = chm.height_m[chm.cell_at(4.4, 5.3).unwrap()];
+        assert_eq!(chm.surface(4.4, 5.3, |_| false), Some([f64::from(own), 0.0]));
+        assert_eq!(chm.surface(-0.1, 5.3, |_| true), None);
+    }
+
+    #[test]
+    fn levels_go_as_far_as_the_points() {
+        assert_eq!(levels(5.0, 16.0), [0.0, 2.0, 5.0, 10.0, 15.0]);
+        assert_eq!(levels(5.0, 1.0), [0.0]);
+        assert_eq!(levels(0.0, 5.2), [0.0, 2.0, 5.0, 5.1, 5.2]);
+    }
+
+    #[test]
+    fn a_cell_of_no_size_is_refused() {
+        let message = Chm::highest(&Piece::default().view(), 0.0).unwrap_err().to_string();
+        assert!(message.contains('0'), "{message}");
+    }
+
+    proptest! {
+        #[test]
+        fn frames_do_not_matter(
+            points in prop::collection::vec((0i32..80, 0i32..80, 0i32..200), 1..80),
+            origin in -50i64..50,
+        ) {
+            let points: Vec<[f64; 3]> = points.iter().map(|p| [p.0, p.1, p.2].map(|v| f64::from(v) * 0.125)).collect();
+            let chm = |frame: Frame| Chm::pit_free(&piece(&points, frame).view(), &HOW).unwrap();
+            let (a, b) = (chm(Frame::default()), chm(Frame::new([origin, -origin, 9])));
+            prop_assert_eq!((a.window, &a.top), (b.window, &b.top));
+            let bits = |chm: &Chm| chm.height_m.iter().map(|h| h.to_bits()).collect::<Vec<_>>();
+            prop_assert_eq!(bits(&a), bits(&b));
+        }
+    }
+}

@@ -154,3 +154,109 @@ pub(crate) fn with_hidden(
     }
     Ok(claims)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Piece;
+
+    fn marker(id: u64, x: f64, height_m: f64, radius_m: f64) -> Marker {
+        let (apex, coefficients) = ([x, 5.0, 100.0 + height_m], [1.0, 0.0]);
+        let crown = Crown { id, apex, coefficients, radius_m, tolerance_m: 0.5, oblique: false };
+        Marker { crown, height_m, score: 1.0 }
+    }
+
+    /// Two cones of slope 1 with apexes at (4, 5) and (12, 5), 14 and 12 m high, filled with echoes,
+    /// on level ground at 100 m.
+    fn cones() -> Piece {
+        let mut piece = Piece::default();
+        for i in 0..64 {
+            for j in 0..40 {
+                let (x, y) = (f64::from(i) * 0.25 + 0.125, f64::from(j) * 0.25 + 0.125);
+                let depth = |at: f64| ((x - at).powi(2) + (y - 5.0).powi(2)).sqrt();
+                let top = (14.0 - depth(4.0)).max(12.0 - depth(12.0));
+                for k in 0..8 {
+                    let height = top - 1.5 * f64::from(k);
+                    piece.x.push(x);
+                    piece.y.push(y);
+                    piece.z.push(100.0 + height);
+                    piece.height_m.push(height as f32);
+                    piece.is_first.push(k == 0);
+                }
+            }
+        }
+        piece
+    }
+
+    fn labels(piece: &Piece, method: SegmentMethod) -> Vec<Claim> {
+        let params = SegmentationParams { method, ..SegmentationParams::default() };
+        RasterSegmenter { params }.segment(&piece.view()).unwrap()
+    }
+
+    const METHODS: [SegmentMethod; 3] =
+        [SegmentMethod::Watershed, SegmentMethod::Dalponte, SegmentMethod::Silva];
+
+    #[test]
+    fn points_have_the_tree_of_their_cell_and_only_the_surface_is_sure() {
+        let mut piece = cones();
+        piece.markers = vec![marker(3, 4.0, 14.0, 0.0), marker(8, 12.0, 12.0, 0.0)];
+        for method in METHODS {
+            let claims = labels(&piece, method);
+            for (i, claim) in claims.iter().enumerate() {
+                let (x, y, k) = (piece.x[i], piece.y[i], i % 8);
+                let near = |at: f64| (x - at).powi(2) + (y - 5.0).powi(2) < 9.0;
+                if near(4.0) || near(12.0) {
+                    let expected = if near(4.0) { 3 } else { 8 };
+                    let id = if piece.height_m[i] < 1.0 { 0 } else { expected };
+                    assert_eq!(claim.id, id, "{method:?} at {x} {y} {k}");
+                    assert_eq!(claim.score > 0.5, k == 0 && id != 0, "{method:?} at {x} {y} {k}");
+                }
+                assert!(
+                    (0.0..=1.0).contains(&claim.score) && (claim.id == 0) == (claim.score == 0.0)
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_tree_below_the_canopy_has_the_points_of_its_crown() {
+        let mut piece = cones();
+        piece.markers =
+            vec![marker(2, 5.0, 6.0, 2.0), marker(3, 4.0, 14.0, 0.0), marker(8, 12.0, 12.0, 0.0)];
+        for method in METHODS {
+            let claims = labels(&piece, method);
+            let of = |id: u64| claims.iter().filter(move |claim| claim.id == id).count();
+            assert!(of(2) > 100, "{method:?}: {}", of(2));
+            for (i, claim) in claims.iter().enumerate() {
+                assert!(claim.id != 2 || i % 8 != 0, "the canopy's surface is not the low tree's");
+            }
+        }
+    }
+
+    #[test]
+    fn what_the_model_does_not_show_is_hidden() {
+        let piece = cones();
+        let params = SegmentationParams::default();
+        let how = PitFree { cell_m: 0.5, max_edge_m: 1.5, step_m: 5.0 };
+        let chm = Chm::pit_free(&piece.view(), &how).unwrap();
+        let markers = [
+            marker(1, 4.1, 13.0, 1.0),
+            marker(2, 4.2, 13.9, 1.0),
+            marker(3, 12.0, 9.0, 1.0),
+            marker(4, 90.0, 9.0, 1.0),
+        ];
+        let (seeds, hidden) = seeds(&chm, &markers, &params);
+        assert_eq!(seeds.iter().map(|seed| seed.marker).collect::<Vec<_>>(), [1]);
+        assert_eq!(hidden.iter().map(|crown| crown.id).collect::<Vec<_>>(), [1, 3, 4]);
+        let high = SegmentationParams { min_height_m: 15.0, ..params };
+        assert_eq!(super::seeds(&chm, &markers, &high).0, []);
+    }
+
+    #[test]
+    fn no_trees_and_no_points() {
+        for method in METHODS {
+            assert!(labels(&cones(), method).iter().all(|claim| claim.id == 0));
+            assert_eq!(labels(&Piece::default(), method), []);
+        }
+    }
+}
