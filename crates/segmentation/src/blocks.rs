@@ -34,7 +34,7 @@ pub fn segment_in_blocks(
     let grid = Grid2::new(view.x, view.y, SEARCH_CELL_M)?;
     let blocks: Vec<(Block, Vec<u32>)> =
         wanted_by_block(view, wanted, block_m).into_iter().collect();
-    let parts: Vec<Vec<(u32, Claim)>> = blocks
+    let parts: Vec<Result<_, Error>> = blocks
         .par_iter()
         .map(|(block, own)| {
             let rect = rect(*block, block_m);
@@ -44,9 +44,12 @@ pub fn segment_in_blocks(
             same_length("claims", near.len(), claims.len())?;
             Ok(own_claims(own, &near, &claims))
         })
-        .collect::<Result<_, Error>>()?;
+        .collect();
     let mut all = vec![Claim::default(); view.len()];
-    parts.into_iter().flatten().for_each(|(index, claim)| all[index as usize] = claim);
+    for part in parts {
+        // Of several errors always the same one.
+        part?.into_iter().for_each(|(index, claim)| all[index as usize] = claim);
+    }
     Ok(all)
 }
 

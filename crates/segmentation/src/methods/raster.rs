@@ -102,9 +102,10 @@ pub fn seeds(
 
 /// Claims of the trees of cells (indices of seeds) on the points in them.
 ///
-/// Near the surface the score falls with the distance from 1 to 1/2, below it with the share of
-/// the surface's height from 1/2 to 1/4; above it, it is 1/2. The distance is that across the surface,
-/// to first order, up to a slope of [`STEEPEST`].
+/// Up to `raster_surface_m` below the surface and up to `above_m` above it, the score falls with the
+/// distance from 1 to 1/2; further below with the share of the surface's height from 1/2 to 1/4; what
+/// is further above is no tree's. The distance is that across the surface, to first order, up to a
+/// slope of [`STEEPEST`].
 fn claims(
     view: &View<'_>,
     chm: &Chm,
@@ -119,12 +120,13 @@ fn claims(
         let [surface_m, slope] = chm.surface(x, y, |cell| trees[cell] == tree)?;
         let below_m = surface_m - height_m;
         let distance_m = below_m.abs() / (1.0 + slope.min(STEEPEST * STEEPEST)).sqrt();
-        let score = if distance_m < params.raster_surface_m {
-            1.0 - 0.5 * distance_m / params.raster_surface_m
-        } else if below_m < 0.0 {
-            0.5
-        } else {
+        let room_m = if below_m < 0.0 { params.above_m } else { params.raster_surface_m };
+        let score = if distance_m <= 0.0 || distance_m < room_m {
+            1.0 - 0.5 * distance_m / room_m.max(f64::MIN_POSITIVE)
+        } else if below_m > 0.0 {
             0.25 + 0.25 * (height_m / surface_m).clamp(0.0, 1.0)
+        } else {
+            return None;
         };
         Some(Claim { id: view.markers[seed.marker].crown.id, score: score as f32 })
     };
