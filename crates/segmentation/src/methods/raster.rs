@@ -100,12 +100,7 @@ pub fn seeds(
     (seeds, hidden)
 }
 
-/// Claims of the trees of cells (indices of seeds) on the points in them.
-///
-/// Up to `raster_surface_m` below the surface and up to `above_m` above it, the score falls with the
-/// distance from 1 to 1/2; further below with the share of the surface's height from 1/2 to 1/4; what
-/// is further above is no tree's. The distance is that across the surface, to first order, up to a
-/// slope of [`STEEPEST`].
+/// Claims of the trees of cells (indices of seeds) on the points in them; see [`score`].
 fn claims(
     view: &View<'_>,
     chm: &Chm,
@@ -114,23 +109,44 @@ fn claims(
     params: &SegmentationParams,
 ) -> Vec<Claim> {
     let claim = |index: usize| {
-        let (x, y, height_m) = (view.x[index], view.y[index], f64::from(view.height_m[index]));
+        let (x, y, height_m) = (view.x[index], view.y[index], view.height_m[index]);
         let tree = trees[chm.cell_at(x, y)?];
-        let seed = seeds.get(tree as usize).filter(|_| height_m >= params.min_height_m)?;
-        let [surface_m, slope] = chm.surface(x, y, |cell| trees[cell] == tree)?;
-        let below_m = surface_m - height_m;
-        let distance_m = below_m.abs() / (1.0 + slope.min(STEEPEST * STEEPEST)).sqrt();
-        let room_m = if below_m < 0.0 { params.above_m } else { params.raster_surface_m };
-        let score = if distance_m <= 0.0 || distance_m < room_m {
-            1.0 - 0.5 * distance_m / room_m.max(f64::MIN_POSITIVE)
-        } else if below_m > 0.0 {
-            0.25 + 0.25 * (height_m / surface_m).clamp(0.0, 1.0)
-        } else {
-            return None;
-        };
-        Some(Claim { id: view.markers[seed.marker].crown.id, score: score as f32 })
+        let seed = seeds.get(tree as usize)?;
+        let surface = chm.surface(x, y, |cell| trees[cell] == tree)?;
+        let score = score(surface, height_m, params)?;
+        Some(Claim { id: view.markers[seed.marker].crown.id, score })
     };
     (0..view.len()).map(|index| claim(index).unwrap_or_default()).collect()
+}
+
+/// How strongly a tree claims a point below or above its surface there, of which height, m, and
+/// squared slope are given.
+///
+/// Up to `raster_surface_m` below the surface and up to `above_m` above it, the score falls with the
+/// distance from 1 to 1/2; further below with the share of the surface's height from 1/2 to 1/4. What
+/// is further above, or lower than `min_height_m`, is no tree's. The distance is that across the
+/// surface, to first order, up to a slope of [`STEEPEST`].
+#[must_use]
+pub fn score(
+    [surface_m, squared_slope]: [f64; 2],
+    height_m: f32,
+    params: &SegmentationParams,
+) -> Option<f32> {
+    let height_m = f64::from(height_m);
+    let below_m = surface_m - height_m;
+    let distance_m = below_m.abs() / (1.0 + squared_slope.min(STEEPEST * STEEPEST)).sqrt();
+    let room_m = if below_m < 0.0 { params.above_m } else { params.raster_surface_m };
+    if height_m.is_nan() || height_m < params.min_height_m {
+        None
+    } else if distance_m == 0.0 {
+        Some(1.0)
+    } else if distance_m < room_m {
+        Some((1.0 - 0.5 * distance_m / room_m) as f32)
+    } else if below_m > 0.0 {
+        Some((0.25 + 0.25 * (height_m / surface_m).clamp(0.0, 1.0)) as f32)
+    } else {
+        None
+    }
 }
 
 /// Slope up to which the distance from a surface is measured across it; steeper ones are edges

@@ -1,7 +1,7 @@
 //! Which points of a segment lie on its upper surface, for segmenters that work on points.
 
 use crate::chm::{Chm, PitFree};
-use crate::methods::raster::{STEEPEST, seeds, with_hidden};
+use crate::methods::raster::{score, seeds, with_hidden};
 use crate::{Claim, Error, SegmentationParams, View};
 
 /// The claims of segments on their points; `tree` is the index of every point's marker, or
@@ -9,9 +9,7 @@ use crate::{Claim, Error, SegmentationParams, View};
 ///
 /// A cell of the pit-free canopy height model belongs to the tree of its highest point. For the
 /// points of that tree the surface is that of the model, for those of other trees in the cell (they
-/// stand below) it is their own highest point there. On the surface the score falls with the distance
-/// from 1 to 1/2 (across the surface, to first order), below it with the share of the surface's
-/// height from 1/2 to 1/4.
+/// stand below) it is their own highest point there; see [`score`].
 ///
 /// A tree that the model hides ([`seeds`]) has the points its crown model claims, except those on the
 /// surface of another: segments that are compared in the plane leave it next to nothing.
@@ -25,7 +23,7 @@ pub fn claims(
 ) -> Result<Vec<Claim>, Error> {
     let chm = Chm::pit_free(view, &model(params))?;
     let (_, hidden) = seeds(&chm, view.markers, params);
-    with_hidden(view, on_surface(view, tree, &chm, params.raster_surface_m), &hidden, params)
+    with_hidden(view, on_surface(view, tree, &chm, params), &hidden, params)
 }
 
 /// How the canopy height model is made.
@@ -38,36 +36,25 @@ fn model(params: &SegmentationParams) -> PitFree {
 }
 
 /// Claims without a thought of hidden trees.
-fn on_surface(view: &View<'_>, tree: &[u32], chm: &Chm, tolerance_m: f64) -> Vec<Claim> {
+fn on_surface(view: &View<'_>, tree: &[u32], chm: &Chm, params: &SegmentationParams) -> Vec<Claim> {
     let owner: Vec<Option<u32>> =
         chm.top.iter().map(|top| tree.get(*top as usize).copied()).collect();
     let tops = tops(view, tree, chm);
     let claim = |index: usize| {
-        let (own, height_m) = (tree[index], f64::from(view.height_m[index]));
+        let own = tree[index];
         let marker = view.markers.get(own as usize)?;
         let cell = chm.cell_at(view.x[index], view.y[index])?;
-        let [surface_m, slope] = if owner[cell] == Some(own) {
+        let surface = if owner[cell] == Some(own) {
             let joined = |cell: usize| owner[cell] == Some(own);
             chm.surface(view.x[index], view.y[index], joined)?
         } else {
             let place = tops.binary_search_by_key(&(own, cell as u32), |top| top.0).ok()?;
             [f64::from(tops[place].1), 0.0]
         };
-        let score = score(surface_m - height_m, height_m / surface_m, slope, tolerance_m);
-        Some(Claim { id: marker.crown.id, score: score as f32 })
+        let score = score(surface, view.height_m[index], params)?;
+        Some(Claim { id: marker.crown.id, score })
     };
     (0..view.len()).map(|index| claim(index).unwrap_or_default()).collect()
-}
-
-fn score(below_m: f64, share: f64, squared_slope: f64, tolerance_m: f64) -> f64 {
-    let distance_m = below_m.abs() / (1.0 + squared_slope.min(STEEPEST * STEEPEST)).sqrt();
-    if distance_m < tolerance_m {
-        1.0 - 0.5 * distance_m / tolerance_m
-    } else if below_m < 0.0 {
-        0.5
-    } else {
-        0.25 + 0.25 * share.clamp(0.0, 1.0)
-    }
 }
 
 /// Height of the highest point of every tree in every cell, sorted by both.
