@@ -128,6 +128,18 @@ fn labels_do_not_depend_on_the_tiles() {
 }
 
 #[test]
+fn labels_do_not_depend_on_threads() {
+    for method in METHODS {
+        let params = SegmentationParams { method, block_m: 16, reach_m: 6.0, ..Default::default() };
+        let with = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| run_with(TileGrid::new(128, [0, 0]).unwrap(), &params))
+        };
+        assert!(with(1) == with(3), "{method:?}");
+    }
+}
+
+#[test]
 fn accepted_crowns_have_points_and_rejected_none() {
     let labelled = run(TileGrid::new(64, [0, 0]).unwrap());
     let count = |id: u64| labelled.values().filter(|(tree, _)| *tree == id).count();
