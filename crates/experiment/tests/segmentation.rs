@@ -73,6 +73,30 @@ fn tables_are_whole_and_figures_sensible() {
     }
 }
 
+/// What grows, how it is scanned and how it is judged stays as it is: figures of former seeds remain
+/// comparable. What is found may get better.
+#[test]
+fn the_stands_of_a_seed_remain() {
+    let experiment = Experiment { repeats: 1, ..small() };
+    let outcomes = run(&experiment, &quick()[..1], 2);
+    let truth = |outcome: &Outcome| {
+        let judged = &outcome.judged;
+        let points: usize = judged.trees.iter().map(|tree| tree.points).sum();
+        let visible = judged.trees.iter().filter(|tree| tree.visible).count();
+        format!("{} {} {} {points}", outcome.case.stand, judged.trees.len(), visible)
+    };
+    let found: Vec<String> = outcomes.iter().map(truth).collect();
+    assert_eq!(found, GOLDEN);
+}
+
+/// Stand, trees, those visible, their points.
+const GOLDEN: [&str; 4] = [
+    "open-conifer 23 20 2416",
+    "open-conifer 23 20 6654",
+    "multilayer-mixed 100 52 3566",
+    "multilayer-mixed 100 52 9515",
+];
+
 /// The whole comparison of one seed: `--nocapture` shows the report.
 #[test]
 #[ignore = "a table, a minute"]

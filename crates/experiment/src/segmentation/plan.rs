@@ -97,6 +97,8 @@ pub struct Experiment {
     pub min_height_m: f64,
     /// When a found tree can be a true one, by crown tops.
     pub matching: MatchParams,
+    /// Largest difference of heights in the stricter comparison, m.
+    pub max_height_difference_m: f64,
     /// Borders between classes of height, m.
     pub height_edges_m: Vec<f64>,
     /// Radius in which the top height is sought that tells the layer of a tree, m.
@@ -119,6 +121,7 @@ impl Default for Experiment {
                 max_height_difference_m: None,
                 rule: MatchRule::Optimal,
             },
+            max_height_difference_m: 5.0,
             height_edges_m: vec![10.0, 20.0, 30.0],
             layer_radius_m: 10.0,
         }
@@ -149,6 +152,13 @@ impl Experiment {
             })
         };
         self.stands.iter().flat_map(of_stand).collect()
+    }
+
+    /// The rules of the stricter comparison: in dense stands of several layers a found tree that is
+    /// none has some true tree within reach by chance, but seldom one of its height.
+    #[must_use]
+    pub fn matching_with_height(&self) -> MatchParams {
+        MatchParams { max_height_difference_m: Some(self.max_height_difference_m), ..self.matching }
     }
 
     /// The seed of a case's scene: that of its repetition, so that one forest is scanned with all

@@ -9,6 +9,8 @@ use timberline_evaluate::{Accuracy, ErrorStats, Layer};
 pub struct Summary {
     /// All trees.
     pub all: Accuracy,
+    /// All trees when heights must agree, too.
+    pub with_height: Accuracy,
     /// Trees with nothing above their tops: found trees that are hidden ones count neither for nor
     /// against.
     pub visible: Accuracy,
@@ -61,6 +63,7 @@ impl Summary {
         let right = found.iter().map(|tree| tree.shared_points).sum();
         Self {
             all: group("all", &trees, &found, |_| true, |_| true),
+            with_height: with_height(&trees, &found),
             visible: group("visible", &trees, &found, |tree| tree.visible, is_not_hidden),
             segments: segments(&hits, trees.len(), found.len()),
             by_height: by_height(&trees, &found, edges_m),
@@ -75,6 +78,16 @@ impl Summary {
             point_purity: share(right, found.iter().map(|tree| tree.points).sum()),
             point_completeness: share(gathered, trees.iter().map(|tree| tree.points).sum()),
         }
+    }
+}
+
+fn with_height(trees: &[&TrueRow], found: &[&FoundRow]) -> Accuracy {
+    Accuracy {
+        group: "with-height".to_owned(),
+        reference: trees.len(),
+        found: trees.iter().filter(|tree| tree.found_with_height).count(),
+        detected: Some(found.len()),
+        correct: found.iter().filter(|tree| tree.is_with_height).count(),
     }
 }
 
@@ -171,7 +184,9 @@ mod tests {
 
     fn tree(id: u64, height_m: f64, visible: bool, hit: Option<Hit>) -> TrueRow {
         let layer = Some(if height_m > 20.0 { Layer::Upper } else { Layer::Lower });
-        TrueRow { id, top_m: [0.0; 2], height_m, layer, visible, points: 100, hit }
+        let found_with_height = hit.is_some();
+        let (top_m, points) = ([0.0; 2], 100);
+        TrueRow { id, top_m, height_m, layer, visible, points, hit, found_with_height }
     }
 
     fn found(id: u64, height_m: f64, is: Option<(u64, bool)>) -> FoundRow {
@@ -184,6 +199,7 @@ mod tests {
             points: 80,
             shared_points,
             is,
+            is_with_height: is.is_some(),
         }
     }
 
@@ -208,6 +224,7 @@ mod tests {
         let summary = Summary::of(&[&example()], &[10.0, 20.0]);
         assert_eq!(summary.all.recall(), Some(2.0 / 3.0));
         assert_eq!(summary.all.precision(), Some(2.0 / 3.0));
+        assert_eq!(summary.with_height.f_score(), summary.all.f_score());
         assert_eq!(summary.visible.recall(), Some(0.5));
         assert_eq!(summary.visible.precision(), Some(0.5), "the hidden one is left out");
         let recalls: Vec<_> = summary.by_height.iter().map(Accuracy::recall).collect();

@@ -32,7 +32,7 @@ pub fn cases_csv(outcomes: &[Outcome]) -> String {
         let summary = &outcome.summary;
         // Writing to a String cannot fail.
         let _ = writeln!(text, "{head},{},{}", accuracy(&summary.all), errors(summary));
-        let groups = [&summary.visible, &summary.segments];
+        let groups = [&summary.with_height, &summary.visible, &summary.segments];
         for group in groups.into_iter().chain(&summary.by_height).chain(&summary.by_layer) {
             let _ = writeln!(text, "{head},{}{}", accuracy(group), ",".repeat(12));
         }
@@ -225,7 +225,9 @@ fn introduction(experiment: &Experiment) -> String {
         "Seed {}, {} repetition(s): squares of {} m, in stands that reach {} m further on ground of {} \
          degrees. A tree counts from {} m of height on, whether it can be seen from above or not. A \
          found tree is a true one when their crown tops are not more than {} m apart in the \
-         plane{difference}; {rule}. Layers are upper, middle and lower thirds of the top height within \
+         plane{difference}; {rule}. *Heights alike*: they must \
+         not differ by more than {} m, either. *Visible trees*: nothing hangs over their tops; found trees \
+         that are hidden ones do not count. Layers are upper, middle and lower thirds of the top height within \
          {} m. Density is that of all returns.\n\n{}",
         experiment.seed,
         experiment.repeats,
@@ -234,6 +236,7 @@ fn introduction(experiment: &Experiment) -> String {
         experiment.slope_deg,
         experiment.min_height_m,
         matching.max_distance_m,
+        experiment.max_height_difference_m,
         experiment.layer_radius_m,
         segmenters.concat()
     )
@@ -256,6 +259,7 @@ fn trees(pooled: &[Pooled]) -> String {
         "precision",
         "F",
         "F, least and most",
+        "F, heights alike",
         "F, visible trees",
     ];
     let mut table = Table::new(&heading, 2);
@@ -271,6 +275,7 @@ fn trees(pooled: &[Pooled]) -> String {
             three(all.precision()),
             three(all.f_score()),
             range.unwrap_or_default(),
+            three(one.summary.with_height.f_score()),
             three(visible.f_score()),
         ]);
         table.row(cells);
@@ -373,7 +378,7 @@ const BOXES: &str = "A tree's box is that around its crown's points; it is a dra
 
 const CLIPS: &str = "The tree of a clip is the found one nearest to the measured top, within 2 m. Right is a height within 1 m and \
     a crown's diameter (of the circle with the area of its polygon) within 20 % of what was measured; clips without a tree \
-    count as wrong.\n\n";
+    count as wrong. The clips are hardly wider than the crowns, so that diameters say little.\n\n";
 
 fn boxes_table(rows: &[BoxRow]) -> String {
     let heading = [

@@ -125,7 +125,10 @@ fn mesh<B: DrawingBackend>(panel: &Panel, plane: &mut Plane<'_, B>) -> Result<()
 /// A value on an axis.
 fn number(axis: &Axis, value: f64) -> String {
     let near = |(own, _): &&(f64, String)| (own - value).abs() < 1e-9;
-    let plain = || format!("{:.*}", decimals(value.abs()).max(1), value);
+    let plain = || match axis.names_only {
+        true => String::new(),
+        false => format!("{:.*}", decimals(value.abs()).max(1), value),
+    };
     axis.names.iter().find(near).map_or_else(plain, |(_, name)| name.clone())
 }
 

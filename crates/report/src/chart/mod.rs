@@ -107,13 +107,23 @@ pub struct Axis {
     pub range: [f64; 2],
     /// Values that are called something else than their number.
     pub names: Vec<(f64, String)>,
+    /// Whether all other values go without their number.
+    pub names_only: bool,
 }
 
 impl Axis {
     /// An axis that shows numbers.
     #[must_use]
     pub fn new(label: &str, range: [f64; 2]) -> Self {
-        Self { label: label.to_owned(), range, names: Vec::new() }
+        Self { label: label.to_owned(), range, names: Vec::new(), names_only: false }
+    }
+
+    /// An axis of named places side by side, at 0, 1, 2 and so on.
+    #[must_use]
+    pub fn places(label: &str, names: impl IntoIterator<Item = String>) -> Self {
+        let names: Vec<_> = names.into_iter().enumerate().map(|(i, n)| (i as f64, n)).collect();
+        let range = [-0.5, names.len() as f64 - 0.5];
+        Self { names, names_only: true, ..Self::new(label, range) }
     }
 }
 
@@ -265,6 +275,15 @@ mod tests {
             all.filter(|&(x, y)| canvas.pixel(x, y) == Some(wanted)).count()
         };
         assert!(count([200, 0, 0]) > 500 && count([0, 0, 200]) > 200);
+    }
+
+    #[test]
+    fn places_have_names_and_no_numbers() {
+        let mut chart = example();
+        chart.panels.truncate(1);
+        chart.panels[0].x = Axis::places("Layer", ["upper", "lower"].map(str::to_owned));
+        let svg = chart.svg().unwrap();
+        assert!(svg.contains("upper") && svg.contains("lower") && !svg.contains("-0.5"));
     }
 
     #[test]

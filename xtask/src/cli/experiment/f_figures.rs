@@ -19,7 +19,7 @@ const COLOURS: [Rgb; 7] = [
 const USUAL_DENSITY_PER_M2: f64 = 10.0;
 
 /// F of all trees over the density of points: a panel for every kind of stand, a curve for every
-/// set of trees. The axis is logarithmic.
+/// set of trees.
 pub(super) fn density(experiment: &Experiment, trees: &[Pooled]) -> Chart {
     let note = "All true trees from 2 m of height on, seen from above or not.";
     over_density(experiment, trees, "Trees found, F", note, |one| one.summary.all.f_score())
@@ -41,8 +41,13 @@ fn over_density(
     note: &str,
     value: impl Fn(&Pooled) -> Option<f64>,
 ) -> Chart {
-    let x = density_axis(&experiment.densities_per_m2);
-    let place = |one: &Pooled| Some([libm::log10(one.case.density_per_m2), value(one)?]);
+    let mut densities = experiment.densities_per_m2.clone();
+    densities.sort_by(f64::total_cmp);
+    let x = Axis::places("Density [points per m²]", densities.iter().map(f64::to_string));
+    let place = |one: &Pooled| {
+        let at = densities.iter().position(|density| *density == one.case.density_per_m2)?;
+        Some([at as f64, value(one)?])
+    };
     let panel = |&stand: &StandKind| {
         let own: Vec<&Pooled> = pooled.iter().filter(|one| one.case.stand == stand).collect();
         Panel {
@@ -65,11 +70,7 @@ fn over_density(
 /// F by canopy layer at one density.
 pub(super) fn layers(experiment: &Experiment, pooled: &[Pooled]) -> Chart {
     let at = usual(&experiment.densities_per_m2);
-    let names = ["upper", "middle", "lower"];
-    let x = Axis {
-        names: names.iter().enumerate().map(|(i, name)| (i as f64, (*name).to_owned())).collect(),
-        ..Axis::new("Canopy layer", [-0.5, 2.5])
-    };
+    let x = Axis::places("Canopy layer", ["upper", "middle", "lower"].map(str::to_owned));
     let panel = |&stand: &StandKind| {
         let own = |one: &&Pooled| one.case.stand == stand && one.case.density_per_m2 == at;
         let own: Vec<&Pooled> = pooled.iter().filter(own).collect();
@@ -100,16 +101,6 @@ fn usual(densities: &[f64]) -> f64 {
 
 fn f_axis() -> Axis {
     Axis::new("F", [0.0, 1.0])
-}
-
-fn density_axis(densities: &[f64]) -> Axis {
-    let logs: Vec<f64> = densities.iter().map(|density| libm::log10(*density)).collect();
-    let low = logs.iter().copied().fold(f64::INFINITY, f64::min);
-    let high = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
-    let names = logs.iter().zip(densities).map(|(log, density)| (*log, density.to_string()));
-    Axis {
-        names: names.collect(), ..Axis::new("Density [points per m²]", [low - 0.1, high + 0.1])
-    }
 }
 
 /// Names of the segmenters in the sequence of the outcomes.
