@@ -52,7 +52,7 @@ pub struct SegmentationParams {
     /// Points lower than this above the ground belong to no tree.
     #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub min_height_m: f64,
-    /// With `membership = "volume"`, and with canopy height models: points up to this far above the
+    /// For `starsac` with `membership = "volume"`, and all others: points up to this far above the
     /// surface still belong, for crowns are rougher than their models.
     #[schemars(range(min = 0.0, max = 20.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub above_m: f64,
@@ -68,7 +68,8 @@ pub struct SegmentationParams {
     /// For `watershed`, `dalponte` and `silva`: largest crown radius.
     #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "Dalponte and Coomes 2016: 10 cells of 1 m"))]
     pub raster_radius_m: f64,
-    /// For the same: points no further than this from the canopy height model are on the surface.
+    /// For all but `starsac`: points no further than this below the canopy height model are on the
+    /// surface.
     #[schemars(range(min = 0.05, max = 5.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub raster_surface_m: f64,
     /// For the same: a tree whose apex is further below the canopy height model has the points of its
@@ -126,5 +127,41 @@ impl Default for SegmentationParams {
             li_split_height_m: 15.0,
             li_radius_m: 10.0,
         }
+    }
+}
+
+impl SegmentationParams {
+    /// What is wrong with the values together: a tree may not reach further than `reach_m`, which
+    /// those who fit crowns to its points rely on.
+    #[must_use]
+    pub fn check(&self) -> Vec<String> {
+        let radius = match self.method {
+            SegmentMethod::Watershed | SegmentMethod::Dalponte | SegmentMethod::Silva => {
+                Some(("raster_radius_m", self.raster_radius_m))
+            }
+            SegmentMethod::Li => Some(("li_radius_m", self.li_radius_m)),
+            SegmentMethod::Starsac => None,
+        };
+        let too_far = radius.filter(|(_, radius_m)| *radius_m > self.reach_m);
+        let fault = |(name, radius_m): (&str, f64)| {
+            format!(
+                "{name} = {radius_m} exceeds reach_m = {}: raise it, also in crown-fit",
+                self.reach_m
+            )
+        };
+        too_far.map(fault).into_iter().collect()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_radius_beyond_the_reach_is_refused_where_it_counts() {
+        let wide = SegmentationParams { raster_radius_m: 20.0, ..SegmentationParams::default() };
+        assert!(wide.check().is_empty(), "crown models have radii of their own");
+        let wide = SegmentationParams { method: SegmentMethod::Silva, ..wide };
+        assert!(wide.check()[0].contains("raster_radius_m = 20"), "{:?}", wide.check());
     }
 }

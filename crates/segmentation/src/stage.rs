@@ -15,7 +15,11 @@ use timberline_pointcloud::{Frame, Rect};
 #[derive(Debug, Clone, Copy)]
 pub struct SegmentationStage;
 
-impl Params for SegmentationParams {}
+impl Params for SegmentationParams {
+    fn check(&self) -> Vec<String> {
+        self.check()
+    }
+}
 
 const INPUTS: &[InputSpec] = &[
     InputSpec::halo(PointTile::NAME),
