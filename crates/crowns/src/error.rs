@@ -91,4 +91,7 @@ pub enum Error {
         /// The reach in the parameters.
         reach_m: f64,
     },
+    /// Positions could not be laid on a grid.
+    #[error(transparent)]
+    Grid(#[from] timberline_pointcloud::Error),
 }

@@ -21,6 +21,7 @@
 //! ```
 
 pub mod base;
+pub mod detection;
 pub mod edge;
 pub mod error;
 pub mod footprint;

@@ -10,6 +10,7 @@
 //! parameters give the same bytes whatever the number of threads.
 
 pub mod crowns;
+pub mod detection;
 mod error;
 pub mod segmentation;
 

@@ -1,10 +1,12 @@
 //! The detection of treetops.
 
+use crate::candidates::Scene;
 use crate::input::Ranked;
 use crate::maxima::{CELL_TICKS, Surface, cell_ticks};
 use crate::prominence::prominence;
+use crate::score::score;
 use crate::window::Window;
-use crate::{Error, Input, Params};
+use crate::{Candidate, Error, Input, Method, Params, apart};
 use rayon::prelude::*;
 use timberline_pointcloud::order;
 
@@ -19,8 +21,13 @@ pub struct Treetop {
     pub height_m: f64,
     /// Diameter or edge of the window in which nothing outranks it, metres.
     pub window_m: f64,
-    /// Least descent on a way to anything higher, metres; see [`crate::prominence`].
+    /// Least descent on a way to anything higher, metres; see [`crate::prominence`]. NaN for the
+    /// method by evidence, which does not ask for it.
     pub prominence_m: f64,
+    /// Probability that it is the top of a tree, by the points around it; 1 for the method by window.
+    pub score: f64,
+    /// Height of what hangs over it, metres above it; 0 where nothing does.
+    pub cover_m: f64,
 }
 
 /// Finds the treetops of a cloud, in the canonical order of their points.
@@ -39,17 +46,50 @@ pub fn find(input: &Input<'_>, params: &Params) -> Result<Vec<Treetop>, Error> {
     }
     input.check()?;
     let ranked = Ranked { input, params };
+    let mut tops = match params.method {
+        Method::Evidence => by_evidence(&ranked)?,
+        Method::Window => by_window(ranked),
+    };
+    tops.sort_by(|a, b| order::compare(input.cloud, a.index as usize, b.index as usize));
+    Ok(tops)
+}
+
+/// The candidates of a cloud with what there is to say about them, from which their scores follow:
+/// what the weights of the score are found on.
+///
+/// # Errors
+/// As [`find`].
+pub fn candidates(input: &Input<'_>, params: &Params) -> Result<Vec<Candidate>, Error> {
+    input.check()?;
+    Ok(Scene::new(Ranked { input, params })?.candidates())
+}
+
+fn by_evidence(ranked: &Ranked<'_>) -> Result<Vec<Treetop>, Error> {
+    let scored = Scene::new(*ranked)?.candidates().into_par_iter().map(|candidate| {
+        let score = score(&candidate.evidence);
+        (candidate, score)
+    });
+    let scored = scored.filter(|(_, score)| *score >= ranked.params.min_score).collect();
+    let treetop = |(candidate, score): (Candidate, f64)| Treetop {
+        index: candidate.index,
+        world_m: ranked.input.cloud.world(candidate.index as usize),
+        height_m: ranked.height(candidate.index as usize),
+        window_m: 2.0 * ranked.params.candidate_radius_m,
+        prominence_m: f64::NAN,
+        score,
+        cover_m: candidate.cover_m,
+    };
+    Ok(apart::keep(ranked, scored)?.into_iter().map(treetop).collect())
+}
+
+fn by_window(ranked: Ranked<'_>) -> Vec<Treetop> {
+    let params = ranked.params;
     let edge = cell_ticks(params);
     let fine = Surface::new(ranked, edge);
     let candidates = maxima(&fine);
     let coarse = if edge == CELL_TICKS { fine } else { Surface::new(ranked, CELL_TICKS) };
-    let mut tops: Vec<Treetop> = candidates
-        .into_par_iter()
-        .map(|(index, window)| treetop(&coarse, index, window))
-        .filter(|top| stands_out(params, top))
-        .collect();
-    tops.sort_by(|a, b| order::compare(input.cloud, a.index as usize, b.index as usize));
-    Ok(tops)
+    let tops = candidates.into_par_iter().map(|(index, window)| treetop(&coarse, index, window));
+    tops.filter(|top| stands_out(params, top)).collect()
 }
 
 /// The points of the surface that no other of their window outranks, with their windows.
@@ -71,6 +111,8 @@ fn treetop(surface: &Surface<'_>, index: u32, window: Window) -> Treetop {
         height_m: ranked.height(index as usize),
         window_m: window.size_m,
         prominence_m: prominence(surface, index as usize),
+        score: 1.0,
+        cover_m: 0.0,
     }
 }
 

@@ -1,7 +1,7 @@
 //! What can go wrong.
 
 /// Why treetops could not be found.
-#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// A column given along with the points has another length.
@@ -17,6 +17,9 @@ pub enum Error {
     /// A parameter is out of range, or two contradict each other.
     #[error("treetops: {}", .0.join("; "))]
     Params(Vec<String>),
+    /// The points could not be laid on a grid.
+    #[error(transparent)]
+    Grid(timberline_pointcloud::Error),
     /// More points than an index of 32 bits can name.
     #[error("{0} points in one cloud; at most {max} can be indexed", max = u32::MAX)]
     TooManyPoints(usize),

@@ -1,16 +1,24 @@
-//! Treetops: local maxima of the point cloud, without a canopy height model.
+//! Treetops: candidates for trees, straight from the points, without a canopy height model.
 //!
-//! A point is a treetop when no point of its window outranks it. Points are ranked by height above
-//! ground or by elevation ([`RankBy`]), equal ones by the canonical order of points, so that every
-//! tie is decided the same way in every tile, frame and order of input. The window is a square or a
-//! circle of fixed size, or a circle that grows with the height of the point ([`WindowKind`]).
-//! Two more conditions keep the number of tops right where points are dense or noisy: points without
-//! neighbours in space do not take part at all (`support_points`), and a top must stand out from the
-//! crown surface around it (`min_prominence_m`, see [`prominence`]).
+//! Two methods. By **evidence** (the default): a candidate is a point with nothing just above it
+//! ([`Params::candidate_radius_m`], [`Params::candidate_gap_m`]), so trees below other crowns have
+//! candidates too; what lies around it in rings and bands of elevation ([`mod@evidence`]) gives the
+//! probability that it is the top of a tree ([`score`]), and of candidates close to one another the
+//! better stands.
 //!
+//! By **window**: a point is a treetop when no point of its window outranks it. Points are ranked by
+//! height above ground or by elevation ([`RankBy`]), equal ones by the canonical order of points, so
+//! that every tie is decided the same way in every tile, frame and order of input. The window is a
+//! square or a circle of fixed size, or a circle that grows with the height of the point
+//! ([`WindowKind`]), and a top must stand out from the crown surface around it (`min_prominence_m`,
+//! see [`prominence`]).
+//!
+//! With either, points without neighbours in space do not take part (`support_points`).
+//!
+//! * [`Params::default`]: by evidence.
+//! * [`Params::by_window`]: window by height, prominence and support, tuned on stands with known trees.
 //! * [`Params::paper`]: the 1.5 m square on first returns of Tittmann et al. 2011.
 //! * [`Params::fixed_circle`]: what lidR's `lmf(ws)` does (all returns, at least 2 m, diameter `ws`).
-//! * [`Params::default`]: window by height, prominence and support, tuned on stands with known trees.
 //!
 //! ```
 //! use timberline_pointcloud::{Frame, Point, PointCloud};
@@ -25,17 +33,23 @@
 //! # Ok::<(), timberline_treetops::Error>(())
 //! ```
 
+mod apart;
+mod candidates;
 mod cells;
 mod detect;
 mod error;
+pub mod evidence;
 mod input;
 mod maxima;
 mod params;
 pub mod prominence;
+pub mod score;
 pub mod stage;
+mod weights;
 mod window;
 
-pub use detect::{Treetop, find};
+pub use candidates::Candidate;
+pub use detect::{Treetop, candidates, find};
 pub use error::Error;
 pub use input::Input;
-pub use params::{Params, RankBy, Returns, WindowKind};
+pub use params::{Method, Params, RankBy, Returns, WindowKind};

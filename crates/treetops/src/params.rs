@@ -6,6 +6,16 @@ use serde::{Deserialize, Serialize};
 /// Narrower windows could leave two treetops in one cell of 0.1 m and so with the same tree id.
 const SMALLEST_WINDOW_M: f64 = 0.3;
 
+/// How treetops are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Method {
+    /// By what the points around a candidate say, also below other crowns.
+    Evidence,
+    /// Highest points of their windows.
+    Window,
+}
+
 /// Shape and size of the window in which a treetop must be the highest point.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
@@ -43,6 +53,32 @@ pub enum RankBy {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
+    /// How treetops are found. The parameters of the window and of prominence serve the method
+    /// `window`, those of candidates, score and distance the method `evidence`.
+    #[schemars(extend("x-source" = "window: Tittmann et al. 2011, section 3; evidence: this program"))]
+    pub method: Method,
+    /// Evidence: a candidate has no point above it within this radius in the plane ...
+    #[schemars(range(min = 0.1, max = 3.0), extend("x-unit" = "m", "x-source" = "this program; the weights of the score were found with it"))]
+    pub candidate_radius_m: f64,
+    /// ... and within this height; what is higher hangs over it.
+    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "this program; the weights of the score were found with it"))]
+    pub candidate_gap_m: f64,
+    /// Evidence: candidates less sure to be the top of a tree are left out. This keeps the work
+    /// small; what is a tree is decided by `min_score` of the stage `detection`.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1", "x-source" = "this program"))]
+    pub min_score: f64,
+    /// Evidence: of two candidates nearer than this in the plane the better stands ...
+    #[schemars(range(min = 0.1, max = 5.0), extend("x-unit" = "m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    pub apart_m: f64,
+    /// ... and the more for each metre of the candidate's height ...
+    #[schemars(range(min = 0.0, max = 0.1), extend("x-unit" = "m/m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    pub apart_per_height: f64,
+    /// ... unless they are further apart than this in elevation ...
+    #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    pub apart_vertical_m: f64,
+    /// ... and the more for each metre of height.
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "m/m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    pub apart_vertical_per_height: f64,
     /// Shape and size of the window.
     #[schemars(extend("x-source" = "variable: Popescu and Wynne 2004; square: Tittmann et al. 2011, section 3"))]
     pub window: WindowKind,
@@ -93,6 +129,14 @@ pub struct Params {
 impl Default for Params {
     fn default() -> Self {
         Self {
+            method: Method::Evidence,
+            candidate_radius_m: 0.75,
+            candidate_gap_m: 2.0,
+            min_score: 0.1,
+            apart_m: 0.6,
+            apart_per_height: 0.03,
+            apart_vertical_m: 3.0,
+            apart_vertical_per_height: 0.1,
             window: WindowKind::Variable,
             window_m: 1.5,
             window_base_m: 1.5,
@@ -113,6 +157,12 @@ impl Default for Params {
 }
 
 impl Params {
+    /// Highest points of windows that grow with height, with prominence and support.
+    #[must_use]
+    pub fn by_window() -> Self {
+        Self { method: Method::Window, ..Self::default() }
+    }
+
     /// Tittmann et al. 2011, section 3: first returns that are not ground and higher than every
     /// point in a square of 1.5 m around them, and nothing else.
     #[must_use]
@@ -145,7 +195,7 @@ impl Params {
             min_prominence_m: 0.0,
             min_prominence_ratio: 0.0,
             support_points: 0,
-            ..Self::default()
+            ..Self::by_window()
         }
     }
 
@@ -153,7 +203,14 @@ impl Params {
     #[must_use]
     pub fn halo_m(&self) -> f64 {
         let support_m = if self.support_points > 0 { self.support_radius_m } else { 0.0 };
+        if self.method == Method::Evidence {
+            return crate::evidence::REACH_M + support_m + self.largest_apart_m();
+        }
         self.largest_reach_m().max(crate::prominence::halo_m(self.prominence_reach_m)) + support_m
+    }
+
+    fn largest_apart_m(&self) -> f64 {
+        (self.apart_m + self.apart_per_height * self.max_height_m).max(SMALLEST_WINDOW_M)
     }
 
     /// Half the largest diagonal or diameter of a window, or as far as its size depends on points.
@@ -192,8 +249,15 @@ impl Params {
         wrong
     }
 
-    fn ranges(&self) -> [(&'static str, f64, f64, f64); 11] {
+    fn ranges(&self) -> [(&'static str, f64, f64, f64); 18] {
         [
+            ("candidate_radius_m", self.candidate_radius_m, 0.1, 3.0),
+            ("candidate_gap_m", self.candidate_gap_m, 0.5, 20.0),
+            ("min_score", self.min_score, 0.0, 1.0),
+            ("apart_m", self.apart_m, 0.1, 5.0),
+            ("apart_per_height", self.apart_per_height, 0.0, 0.1),
+            ("apart_vertical_m", self.apart_vertical_m, 0.5, 30.0),
+            ("apart_vertical_per_height", self.apart_vertical_per_height, 0.0, 1.0),
             ("window_m", self.window_m, SMALLEST_WINDOW_M, 50.0),
             ("window_base_m", self.window_base_m, SMALLEST_WINDOW_M, 50.0),
             ("window_per_height", self.window_per_height, 0.0, 1.0),

@@ -27,8 +27,8 @@ impl Stage for TreetopsStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "treetops",
-            version: 1,
-            summary: "treetops as local maxima of the points (Tittmann et al. 2011; window by height: Popescu and Wynne 2004)",
+            version: 2,
+            summary: "candidates for trees by the points around them, also below other crowns; or local maxima (Tittmann et al. 2011)",
             unit: UnitKind::Tile,
             inputs: INPUTS,
             outputs: &[Treetops::NAME],
@@ -62,6 +62,8 @@ fn own_tops(all: &Surroundings, params: &Params) -> Result<Treetops, crate::Erro
             height_m: top.height_m,
             window_m: top.window_m,
             prominence_m: top.prominence_m,
+            score: top.score as f32,
+            cover_m: top.cover_m as f32,
         })
     };
     let mut tops: Vec<Treetop> = found.iter().filter_map(own).collect();

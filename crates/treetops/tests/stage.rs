@@ -14,7 +14,7 @@ use timberline_artefact::stage::Campaign;
 use timberline_artefact::{Facts, UnitId, read, tree_id};
 use timberline_pointcloud::{Frame, Point, PointCloud, TileGrid, TileId, frame};
 use timberline_treetops::stage::TreetopsStage;
-use timberline_treetops::{Input, Params, RankBy, find};
+use timberline_treetops::{Input, Method, Params, RankBy, find};
 
 /// Points of a bumpy slope around tile borders: x, y in decimetres, z in decimetres.
 fn campaign(raw: &[(i32, i32, i32)]) -> PointCloud {
@@ -55,21 +55,25 @@ fn over_tiles(cloud: &PointCloud, grid: TileGrid, params: &Params) -> Vec<Treeto
 }
 
 /// What tells a treetop apart, its index in the tile aside.
-fn facts_of(tops: &[Treetop]) -> Vec<(u64, [f64; 3], f64, f64, f64)> {
-    tops.iter().map(|t| (t.id, t.apex_m, t.height_m, t.window_m, t.prominence_m)).collect()
+fn facts_of(tops: &[Treetop]) -> Vec<(u64, [f64; 3], [u64; 3], [u32; 2])> {
+    let bits = |t: &Treetop| [t.height_m, t.window_m, t.prominence_m].map(f64::to_bits);
+    let scores = |t: &Treetop| [t.score, t.cover_m].map(f32::to_bits);
+    tops.iter().map(|t| (t.id, t.apex_m, bits(t), scores(t))).collect()
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(3))]
+    #![proptest_config(ProptestConfig::with_cases(6))]
 
     #[test]
     fn cut_as_you_like(
         raw in prop::collection::vec((-320i32..320, -320i32..320, 0i32..150), 100..400),
-        origin in -40i64..40, elevation in any::<bool>(),
+        origin in -40i64..40, elevation in any::<bool>(), evidence in any::<bool>(),
     ) {
         let cloud = campaign(&raw);
         let rank_by = if elevation { RankBy::Elevation } else { RankBy::Height };
-        let params = Params { rank_by, support_radius_m: 5.0, ..Params::default() };
+        let method = if evidence { Method::Evidence } else { Method::Window };
+        let params =
+            Params { method, min_score: 0.0, rank_by, support_radius_m: 5.0, ..Params::default() };
         let height_m: Vec<f32> = (0..cloud.len()).map(|i| height_of(&cloud, i)).collect();
         let mut whole: Vec<Treetop> = find(&Input::new(&cloud, &height_m), &params)
             .unwrap()
@@ -81,6 +85,8 @@ proptest! {
                 height_m: top.height_m,
                 window_m: top.window_m,
                 prominence_m: top.prominence_m,
+                score: top.score as f32,
+                cover_m: top.cover_m as f32,
             })
             .collect();
         whole.sort_by_key(|top| top.id);

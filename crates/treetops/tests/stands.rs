@@ -107,7 +107,7 @@ fn every_kind_of_stand() {
         ("savanna", 0.88),
     ];
     for ((name, params), (_, least)) in kinds().into_iter().zip(least) {
-        let result = judge(&stand(params, 70.0, 8.0, 0.0), &Params::default());
+        let result = judge(&stand(params, 70.0, 8.0, 0.0), &Params::by_window());
         println!(
             "{name}: recall {:.3}, precision {:.3}, F {:.3}, position {:.3} m",
             result[0],
@@ -124,7 +124,11 @@ fn every_kind_of_stand() {
 fn noise_does_not_multiply_trees() {
     let params = StandParams::open_conifer();
     let mut truth = stand(params, 60.0, 8.0, 0.0);
-    let clean = find(&Input::new(&truth.cloud, &truth.height_m), &Params::default()).unwrap().len();
+    let methods = [Params::by_window(), Params { min_score: 0.4, ..Params::default() }];
+    let count = |truth: &Truth, params| {
+        find(&Input::new(&truth.cloud, &truth.height_m), params).unwrap().len()
+    };
+    let clean = methods.each_ref().map(|params| count(&truth, params));
     // A lone point every two metres at 45 m, well above the canopy.
     for i in 0..900 {
         let at = [CORNER_M[0] + f64::from(i % 30) * 2.0, CORNER_M[1] + f64::from(i / 30) * 2.0];
@@ -134,8 +138,10 @@ fn noise_does_not_multiply_trees() {
             .push_world([at[0], at[1], 560.0 + away], &timberline_pointcloud::Point::default());
         truth.height_m.push((60.0 + away) as f32);
     }
-    let noisy = find(&Input::new(&truth.cloud, &truth.height_m), &Params::default()).unwrap().len();
-    assert!(noisy.abs_diff(clean) <= clean / 50, "{clean} without noise, {noisy} with");
+    let noisy = methods.each_ref().map(|params| count(&truth, params));
+    for (clean, noisy) in clean.into_iter().zip(noisy) {
+        assert!(noisy.abs_diff(clean) <= clean / 50, "{clean} without noise, {noisy} with");
+    }
 }
 
 /// The table behind the defaults: mean over kinds of stand of F against trees with a visible top.
@@ -144,7 +150,11 @@ fn noise_does_not_multiply_trees() {
 fn by_density_and_slope() {
     let methods = [
         ("default", Params::default()),
-        ("by height", Params { rank_by: timberline_treetops::RankBy::Height, ..Params::default() }),
+        ("by window", Params::by_window()),
+        (
+            "by height",
+            Params { rank_by: timberline_treetops::RankBy::Height, ..Params::by_window() },
+        ),
         ("circle 3 m", Params::fixed_circle(3.0)),
         ("circle 5 m", Params::fixed_circle(5.0)),
     ];

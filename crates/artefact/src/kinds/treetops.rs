@@ -1,4 +1,10 @@
-//! Treetops of a tile. Raise the version when the fields or their meaning change.
+//! Treetops of a tile: candidates for trees. Raise the version when the fields or their meaning
+//! change.
+//!
+//! * Version 2: the score of each, and what hangs over it.
+//! * Version 1 (`v1.rs`) is read and migrated.
+
+mod v1;
 
 use super::table_kind;
 use serde::{Deserialize, Serialize};
@@ -21,10 +27,14 @@ pub struct Treetop {
     pub apex_m: [f64; 3],
     /// Height of the apex above ground, metres.
     pub height_m: f64,
-    /// Width of the window in which it is the highest, metres.
+    /// Width of the window in which it is the highest (of the points not far above it), metres.
     pub window_m: f64,
-    /// How far it rises above the saddle or the window's mean, metres; see the stage.
+    /// How far it rises above the saddle to anything higher, metres; NaN where that was not asked.
     pub prominence_m: f64,
+    /// How sure it is that this is the top of a tree, 0 to 1, by the points around it.
+    pub score: f32,
+    /// Height of what hangs over it, metres above it; 0 where nothing does.
+    pub cover_m: f32,
 }
 
-table_kind!(Treetops, "treetops", 1, "local maxima of a tile");
+table_kind!(Treetops, "treetops", 2, "candidates for trees of a tile", 1 => v1::Treetops);

@@ -133,6 +133,8 @@ pub(crate) fn write_all(folder: &Path) -> Vec<(&'static str, PathBuf)> {
         height_m: 27.5,
         window_m: 3.0,
         prominence_m: 1.25,
+        score: 0.75,
+        cover_m: 4.5,
     };
     let mut store = Alone::new(folder, Campaign::default());
     let mut paths = Vec::new();

@@ -62,6 +62,9 @@ pub enum OutlierScope {
     Radius,
 }
 
+/// What is further above the apex of a tree below other crowns belongs to those, m.
+const COVER_GAP_M: f64 = 2.0;
+
 /// Parameters of the stage `crown-models`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -161,6 +164,14 @@ impl CrownModelParams {
             tolerance_m: 0.8,
             ..Self::default()
         }
+    }
+
+    /// Whether a point is looked at by the model of a tree over which something hangs
+    /// (`cover_m` above 0), or nothing: below other crowns all echoes count, and what is far above
+    /// the apex is of those crowns. `dz_m` is the point's elevation above the apex.
+    #[must_use]
+    pub fn is_seen(&self, is_first: bool, dz_m: f64, cover_m: f64) -> bool {
+        if cover_m > 0.0 { dz_m <= COVER_GAP_M } else { is_first || self.returns == Returns::All }
     }
 
     /// Half width of the window around a tree of the given height, m.

@@ -2,7 +2,7 @@
 
 use super::{BATCH, GRID_CELL_M};
 use crate::Window;
-use crate::params::{CrownModelParams, Returns};
+use crate::params::CrownModelParams;
 use crate::starsac::{self, Outcome, Rejection, Shape};
 use rayon::prelude::*;
 use timberline_artefact::kinds::{
@@ -33,7 +33,7 @@ impl Stage for CrownModelStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "crown-models",
-            version: 1,
+            version: 2,
             summary: "A crown surface around every treetop by sample consensus (StarSac, Tittmann et al. 2011)",
             unit: UnitKind::Tile,
             inputs: MODEL_INPUTS,
@@ -75,12 +75,12 @@ fn model_of(
     params: &CrownModelParams,
 ) -> CrownModel {
     let cloud = &near.cloud;
-    let first_only = params.returns == Returns::First;
+    let apex = cloud.frame.local_from_world(top.apex_m);
     let accept = |i: usize| {
-        let wanted = !first_only || cloud.return_number[i] <= 1;
+        let is_first = cloud.return_number[i] <= 1;
+        let wanted = params.is_seen(is_first, cloud.z[i] - apex[2], f64::from(top.cover_m));
         wanted.then(|| f64::from(near.height_m[i]) >= params.min_height_m)
     };
-    let apex = cloud.frame.local_from_world(top.apex_m);
     let half_width = params.half_width_m(top.height_m);
     let window = Window::gather([&cloud.x, &cloud.y, &cloud.z], grid, apex, half_width, accept);
     wire(top, params, &starsac::fit_window(&window, params, top.id))

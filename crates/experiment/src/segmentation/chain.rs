@@ -5,8 +5,9 @@ use crate::Error;
 use rayon::prelude::*;
 use serde::Serialize;
 use timberline_artefact::tree_id;
+use timberline_crowns::detection::{Candidate, Candidates};
 use timberline_crowns::starsac::{CrownModel, Shape, fit_window};
-use timberline_crowns::{CrownModelParams, Window};
+use timberline_crowns::{CrownModelParams, DetectionParams, Window};
 use timberline_pointcloud::Grid2;
 use timberline_segmentation::{Crown, Marker, View};
 use timberline_treetops::{Input, Treetop, find};
@@ -18,10 +19,21 @@ pub struct Chain {
     pub treetops: timberline_treetops::Params,
     /// Of their crown models.
     pub crown_models: CrownModelParams,
+    /// Of the choice among them.
+    pub detection: DetectionParams,
 }
 
 /// Edge of the search grid's cells, m.
 const GRID_CELL_M: f64 = 2.0;
+
+/// A candidate with the crown model it is judged by.
+#[derive(Debug, Clone, PartialEq)]
+struct Modelled {
+    /// Its point.
+    index: u32,
+    candidate: Candidate,
+    crown: Crown,
+}
 
 impl Chain {
     /// The trees of a plot, sorted by id.
@@ -29,28 +41,50 @@ impl Chain {
     /// # Errors
     /// What the stages refuse.
     pub fn markers(&self, plot: &Plot) -> Result<Vec<Marker>, Error> {
-        let mut markers = detected(self.candidates(plot)?);
-        markers.sort_by_key(|marker| marker.crown.id);
-        Ok(markers)
+        let modelled = self.modelled(plot)?;
+        let candidates = self.rivals(&modelled)?;
+        let markers = modelled.into_iter().zip(candidates.scores()).map(|(one, score)| {
+            let height_m = one.candidate.height_m;
+            Marker { crown: one.crown, height_m, score: score as f32 }
+        });
+        let least = self.detection.min_score as f32;
+        Ok(markers.filter(|marker| marker.score >= least).collect())
     }
 
-    /// Every candidate with its crown model; without one its radius is 0.
-    fn candidates(&self, plot: &Plot) -> Result<Vec<Marker>, Error> {
+    /// The candidates for trees of a plot, to be judged, sorted by id, and their points.
+    ///
+    /// # Errors
+    /// What the stages refuse.
+    pub fn candidates(&self, plot: &Plot) -> Result<(Candidates, Vec<u32>), Error> {
+        let modelled = self.modelled(plot)?;
+        let points = modelled.iter().map(|one| one.index).collect();
+        Ok((self.rivals(&modelled)?, points))
+    }
+
+    fn rivals(&self, modelled: &[Modelled]) -> Result<Candidates, Error> {
+        let all = modelled.iter().map(|one| one.candidate).collect();
+        Ok(Candidates::new(all, self.detection.reach_m)?)
+    }
+
+    /// Every candidate with its crown model, sorted by id.
+    fn modelled(&self, plot: &Plot) -> Result<Vec<Modelled>, Error> {
         let cloud = &plot.cloud;
         let tops = find(&Input::new(cloud, &plot.height_m), &self.treetops)?;
         let grid = Grid2::new(&cloud.x, &cloud.y, GRID_CELL_M)?;
-        Ok(tops.par_iter().map(|top| self.candidate(plot, &grid, top)).collect())
+        let mut all: Vec<Modelled> =
+            tops.par_iter().map(|top| self.model(plot, &grid, top)).collect();
+        all.sort_by_key(|one| one.candidate.id);
+        Ok(all)
     }
 
-    fn candidate(&self, plot: &Plot, grid: &Grid2, top: &Treetop) -> Marker {
+    fn model(&self, plot: &Plot, grid: &Grid2, top: &Treetop) -> Modelled {
         let (cloud, params) = (&plot.cloud, &self.crown_models);
         let id = tree_id(top.world_m[0], top.world_m[1]);
-        let first_only = params.returns == timberline_crowns::params::Returns::First;
+        let apex = cloud.local(top.index as usize);
         let accept = |i: usize| {
-            let wanted = !first_only || plot.is_first[i];
+            let wanted = params.is_seen(plot.is_first[i], cloud.z[i] - apex[2], top.cover_m);
             wanted.then(|| f64::from(plot.height_m[i]) >= params.min_height_m)
         };
-        let apex = cloud.local(top.index as usize);
         let half_width_m = params.half_width_m(top.height_m);
         let window =
             Window::gather([&cloud.x, &cloud.y, &cloud.z], grid, apex, half_width_m, accept);
@@ -64,7 +98,19 @@ impl Chain {
             oblique: true,
         };
         let crown = outcome.accepted().map_or(blank, |model| standing(model, blank));
-        Marker { crown, height_m: top.height_m, score: 1.0 }
+        let candidate = Candidate {
+            id,
+            apex,
+            height_m: top.height_m,
+            score: top.score,
+            cover_m: top.cover_m,
+            coefficients: crown.coefficients,
+            radius_m: crown.radius_m,
+            inliers: outcome.crown.as_ref().map_or(0, CrownModel::grade),
+            outliers: outcome.crown.as_ref().map_or(0, |model| model.outliers),
+            residual: outcome.crown.as_ref().map_or(0.0, |m| m.mean_residual_m / crown.tolerance_m),
+        };
+        Modelled { index: top.index, candidate, crown }
     }
 }
 
@@ -75,12 +121,6 @@ fn standing(model: &CrownModel, blank: Crown) -> Crown {
         oblique: model.model.shape == Shape::TwoParameter,
         ..blank
     }
-}
-
-/// The trees among the candidates: those whose model stands.
-fn detected(mut candidates: Vec<Marker>) -> Vec<Marker> {
-    candidates.retain(|marker| marker.crown.radius_m > 0.0);
-    candidates
 }
 
 /// What a segmenter sees of a plot.

@@ -1,0 +1,115 @@
+//! Which candidates are trees.
+//!
+//! A treetop comes with the probability that the points right around it give it. Its crown model
+//! adds what a larger view shows: how much of its surroundings the model explains and how much it
+//! does not, and how it gets on with its rivals: a bump on the surface of a higher candidate's crown
+//! is a branch of it, a candidate on whose own surface others lie is likely their tree. Not the
+//! width of a window decides, but what the crowns gain by standing.
+//!
+//! The values ([`evidence`]) are weighted by a logistic regression of second order, found on stands
+//! with known trees.
+
+mod evidence;
+mod weights;
+
+pub use evidence::{Evidence, LEN, evidence};
+
+use crate::Error;
+use rayon::prelude::*;
+use timberline_pointcloud::Grid2;
+use weights::{CONSTANT, FACTORS, MEANS, SCALES};
+
+/// A candidate with its crown model. Positions are in any one frame, metres.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Candidate {
+    /// Tree id.
+    pub id: u64,
+    /// Highest point.
+    pub apex: [f64; 3],
+    /// Its height above ground.
+    pub height_m: f64,
+    /// Probability that it is the top of a tree, by the points right around it.
+    pub score: f64,
+    /// Height of what hangs over it; 0 where nothing does.
+    pub cover_m: f64,
+    /// Depth of the model's surface below the apex at distance r is `b1 r + b2 r²`.
+    pub coefficients: [f64; 2],
+    /// Radius of the model; 0 without one.
+    pub radius_m: f64,
+    /// Points on the surface and, within the radius, off it.
+    pub inliers: u32,
+    /// See `inliers`.
+    pub outliers: u32,
+    /// Mean distance of the inliers from the surface, as a share of what is tolerated.
+    pub residual: f64,
+}
+
+/// Candidates that can be looked up by place.
+#[derive(Debug)]
+pub struct Candidates {
+    all: Vec<Candidate>,
+    grid: Grid2,
+    reach_m: f64,
+}
+
+/// Edge of the search grid's cells, m.
+const GRID_CELL_M: f64 = 5.0;
+
+impl Candidates {
+    /// Candidates in any order; those further than `reach_m` from one another are no rivals.
+    ///
+    /// # Errors
+    /// [`Error::Grid`] for positions that are none.
+    pub fn new(mut all: Vec<Candidate>, reach_m: f64) -> Result<Self, Error> {
+        all.sort_unstable_by_key(|candidate| candidate.id);
+        let column = |axis: usize| all.iter().map(|one| one.apex[axis]).collect::<Vec<f64>>();
+        let grid = Grid2::new(&column(0), &column(1), GRID_CELL_M)?;
+        Ok(Self { all, grid, reach_m })
+    }
+
+    /// The candidates, sorted by id.
+    #[must_use]
+    pub fn all(&self) -> &[Candidate] {
+        &self.all
+    }
+
+    /// Candidates within reach of one, and their distances in the plane, sorted by id.
+    fn near(&self, own: &Candidate) -> Vec<(&Candidate, f64)> {
+        let mut near = Vec::new();
+        self.grid.candidates(own.apex[0], own.apex[1], self.reach_m, |place| {
+            let other = &self.all[place];
+            let (dx, dy) = (other.apex[0] - own.apex[0], other.apex[1] - own.apex[1]);
+            let distance = (dx * dx + dy * dy).sqrt();
+            if other.id != own.id && distance <= self.reach_m {
+                near.push((other, distance));
+            }
+        });
+        near.sort_unstable_by_key(|(other, _)| other.id);
+        near
+    }
+
+    /// What speaks for and against each candidate, in their order.
+    #[must_use]
+    pub fn evidence(&self) -> Vec<Evidence> {
+        self.all.par_iter().map(|own| evidence(own, &self.near(own))).collect()
+    }
+
+    /// The probability that each candidate is a tree, in their order.
+    #[must_use]
+    pub fn scores(&self) -> Vec<f64> {
+        self.evidence().iter().map(score).collect()
+    }
+}
+
+/// The probability of a tree by its evidence.
+fn score(evidence: &Evidence) -> f64 {
+    let standard: [f64; LEN] = std::array::from_fn(|i| (evidence[i] - MEANS[i]) / SCALES[i]);
+    let mut sum = CONSTANT;
+    let mut factors = FACTORS.iter();
+    let mut add = |term: f64| sum += term * factors.next().copied().unwrap_or_default();
+    standard.iter().for_each(|value| add(*value));
+    for (i, a) in standard.iter().enumerate() {
+        standard[i..].iter().for_each(|b| add(a * b));
+    }
+    1.0 / (1.0 + libm::exp(-sum))
+}

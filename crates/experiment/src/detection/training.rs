@@ -1,0 +1,111 @@
+//! Candidates on generated stands, each known to be right or not.
+
+use super::Sample;
+use crate::Error;
+use crate::segmentation::{Case, Chain, Experiment, Plot};
+use rayon::prelude::*;
+use std::collections::BTreeMap;
+use timberline_treetops::evidence::LEN;
+use timberline_treetops::{Candidate, Input, Params, candidates};
+
+/// The stands weights are found on: those of an experiment, on several slopes.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Training {
+    /// Stands, densities and repetitions.
+    pub experiment: Experiment,
+    /// Slopes of the ground, degrees; repetitions take them in turn.
+    pub slopes_deg: Vec<f64>,
+}
+
+impl Default for Training {
+    /// Seed 1000: experiments of other seeds share no stand with it.
+    fn default() -> Self {
+        Self {
+            experiment: Experiment { seed: 1000, repeats: 2, ..Experiment::default() },
+            slopes_deg: vec![4.0, 25.0],
+        }
+    }
+}
+
+impl Training {
+    /// The cases with their plots, one after the other; `done` is called after each.
+    ///
+    /// # Errors
+    /// The first error of `visit` or of the generation.
+    pub fn each<T: Send>(
+        &self,
+        visit: impl Fn(&Plot) -> Result<T, Error> + Sync,
+        done: &(dyn Fn() + Sync),
+    ) -> Result<Vec<T>, Error> {
+        let of = |case: &Case| {
+            let turn = case.repeat as usize % self.slopes_deg.len().max(1);
+            let slope_deg = self.slopes_deg.get(turn).copied().unwrap_or_default();
+            let experiment = Experiment { slope_deg, ..self.experiment.clone() };
+            let result = visit(&Plot::generate(&experiment, case)?);
+            done();
+            result
+        };
+        self.experiment.cases().par_iter().map(of).collect()
+    }
+}
+
+/// The candidates for treetops of all stands, with what the points around them say.
+///
+/// # Errors
+/// What growing, scanning and searching refuse.
+pub fn treetops(
+    training: &Training,
+    params: &Params,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Sample<LEN>>, Error> {
+    let of = |plot: &Plot| {
+        let found = candidates(&Input::new(&plot.cloud, &plot.height_m), params)?;
+        let points: Vec<u32> = found.iter().map(|candidate| candidate.index).collect();
+        let right = right(plot, &points);
+        let samples = found.into_iter().zip(right).filter(|(one, _)| judged(plot, one.index));
+        let sample = |(one, is_right): (Candidate, bool)| Sample { values: one.evidence, is_right };
+        Ok(samples.map(sample).collect::<Vec<_>>())
+    };
+    Ok(training.each(of, done)?.into_iter().flatten().collect())
+}
+
+/// The candidates that treetops and crown models leave, with what speaks for and against each.
+///
+/// # Errors
+/// As [`treetops`].
+pub fn trees(
+    training: &Training,
+    chain: &Chain,
+    done: &(dyn Fn() + Sync),
+) -> Result<Vec<Sample<{ timberline_crowns::detection::LEN }>>, Error> {
+    let of = |plot: &Plot| {
+        let (candidates, points) = chain.candidates(plot)?;
+        let right = right(plot, &points);
+        let samples = points.iter().zip(candidates.evidence()).zip(right);
+        let samples = samples.filter(|((point, _), _)| judged(plot, **point));
+        let sample = |((_, values), is_right)| Sample { values, is_right };
+        Ok(samples.map(sample).collect::<Vec<_>>())
+    };
+    Ok(training.each(of, done)?.into_iter().flatten().collect())
+}
+
+fn judged(plot: &Plot, point: u32) -> bool {
+    let [x, y, _] = plot.cloud.world(point as usize);
+    plot.is_judged([x, y])
+}
+
+/// Whether each point is the highest of these points in its true tree.
+fn right(plot: &Plot, points: &[u32]) -> Vec<bool> {
+    let mut best: BTreeMap<u64, usize> = BTreeMap::new();
+    let z = |place: usize| plot.cloud.z[points[place] as usize];
+    for (place, point) in points.iter().enumerate() {
+        let best = best.entry(plot.label[*point as usize]).or_insert(place);
+        if z(place) > z(*best) {
+            *best = place;
+        }
+    }
+    best.remove(&0);
+    let mut right = vec![false; points.len()];
+    best.values().for_each(|place| right[*place] = true);
+    right
+}
