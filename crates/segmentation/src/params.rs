@@ -52,7 +52,7 @@ pub struct SegmentationParams {
     /// Points lower than this above the ground belong to no tree.
     #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub min_height_m: f64,
-    /// For `starsac` with `membership = "volume"`, and all others: points up to this far above the
+    /// For `starsac` with `membership = "volume"`: points up to this far above the
     /// surface still belong, for crowns are rougher than their models.
     #[schemars(range(min = 0.0, max = 20.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub above_m: f64,

@@ -94,7 +94,7 @@ fn compare(scan: &str, cell_m: f64) -> [f64; 3] {
 #[ignore = "needs TIMBERLINE_DATA"]
 fn mixed_conifer_has_the_trees_of_plain_immersion() {
     let [ours, theirs, same] = compare("als/lidR/MixedConifer.laz", 0.5);
-    assert!((ours / theirs - 1.0).abs() <= 0.1, "{ours} and {theirs}");
+    assert!((ours / theirs - 1.0).abs() <= 0.01, "{ours} and {theirs}");
     assert!(same > 0.95, "{same}");
 }
 
@@ -102,6 +102,6 @@ fn mixed_conifer_has_the_trees_of_plain_immersion() {
 #[ignore = "needs TIMBERLINE_DATA"]
 fn megaplot_has_the_trees_of_plain_immersion() {
     let [ours, theirs, same] = compare("als/lidR/Megaplot.laz", 0.5);
-    assert!((ours / theirs - 1.0).abs() <= 0.1, "{ours} and {theirs}");
+    assert!((ours / theirs - 1.0).abs() <= 0.01, "{ours} and {theirs}");
     assert!(same > 0.95, "{same}");
 }

@@ -122,10 +122,11 @@ fn claims(
 /// How strongly a tree claims a point below or above its surface there, of which height, m, and
 /// squared slope are given.
 ///
-/// Up to `raster_surface_m` below the surface and up to `above_m` above it, the score falls with the
-/// distance from 1 to 1/2; further below with the share of the surface's height from 1/2 to 1/4. What
-/// is further above, or lower than `min_height_m`, is no tree's. The distance is that across the
-/// surface, to first order, up to a slope of [`STEEPEST`].
+/// Up to `raster_surface_m` below the surface the score falls with the distance from 1 to 1/2; further
+/// below with the share of the surface's height from 1/2 to 1/4. What stands out of it is on the
+/// surface, too, since where points are few the model misses tops: there the score falls from 1
+/// towards 1/2. A point lower than `min_height_m` is no tree's. The distance is that across the surface,
+/// to first order, up to a slope of [`STEEPEST`].
 #[must_use]
 pub fn score(
     [surface_m, squared_slope]: [f64; 2],
@@ -135,18 +136,17 @@ pub fn score(
     let height_m = f64::from(height_m);
     let below_m = surface_m - height_m;
     let distance_m = below_m.abs() / (1.0 + squared_slope.min(STEEPEST * STEEPEST)).sqrt();
-    let room_m = if below_m < 0.0 { params.above_m } else { params.raster_surface_m };
-    if height_m.is_nan() || height_m < params.min_height_m {
-        None
-    } else if distance_m == 0.0 {
-        Some(1.0)
+    let room_m = params.raster_surface_m;
+    let score = if height_m.is_nan() || height_m < params.min_height_m {
+        return None;
+    } else if below_m <= 0.0 {
+        1.0 - 0.5 * distance_m / (distance_m + room_m)
     } else if distance_m < room_m {
-        Some((1.0 - 0.5 * distance_m / room_m) as f32)
-    } else if below_m > 0.0 {
-        Some((0.25 + 0.25 * (height_m / surface_m).clamp(0.0, 1.0)) as f32)
+        1.0 - 0.5 * distance_m / room_m
     } else {
-        None
-    }
+        0.25 + 0.25 * (height_m / surface_m).clamp(0.0, 1.0)
+    };
+    Some(score as f32)
 }
 
 /// Slope up to which the distance from a surface is measured across it; steeper ones are edges
