@@ -24,12 +24,13 @@ use timberline_segmentation::{
     Claim, SegmentMethod, SegmentationParams, Segmenter, View, segment_in_blocks, segmenter,
 };
 
-const METHODS: [(&str, SegmentMethod); 5] = [
+const METHODS: [(&str, SegmentMethod); 6] = [
     ("starsac", SegmentMethod::Starsac),
     ("watershed", SegmentMethod::Watershed),
     ("dalponte", SegmentMethod::Dalponte),
     ("silva", SegmentMethod::Silva),
     ("li", SegmentMethod::Li),
+    ("ncut", SegmentMethod::Ncut),
 ];
 
 const SIZES: [u64; 4] = [250_000, 500_000, 1_000_000, 2_000_000];

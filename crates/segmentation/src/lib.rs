@@ -23,6 +23,6 @@ pub use blocks::segment_in_blocks;
 pub use chm::{Chm, PitFree};
 pub use claim::{Claim, Crown, label};
 pub use error::Error;
-pub use methods::{Li, LiParams, RasterSegmenter, Seed, Segments, StarSac};
+pub use methods::{Li, LiParams, Ncut, NcutParams, RasterSegmenter, Seed, Segments, StarSac};
 pub use params::{Membership, SegmentMethod, SegmentationParams};
 pub use segmenter::{Marker, Piece, Segmenter, View, segmenter};

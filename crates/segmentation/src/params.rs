@@ -27,6 +27,8 @@ pub enum SegmentMethod {
     Silva,
     /// Growing from the top down by spacing in the plane (Li et al. 2012).
     Li,
+    /// Normalized cut of a graph of voxels (Reitberger et al. 2009).
+    Ncut,
 }
 
 /// Parameters of the stage `segmentation`.
@@ -101,6 +103,30 @@ pub struct SegmentationParams {
     /// For `li`: farthest a tree reaches from its top.
     #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "this program: as raster_radius_m"))]
     pub li_radius_m: f64,
+    /// For `ncut`: edge of the voxels in the plane.
+    #[schemars(range(min = 0.2, max = 5.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: measured on simulated stands"))]
+    pub ncut_voxel_m: f64,
+    /// For `ncut`: height of the voxels.
+    #[schemars(range(min = 0.2, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: measured on simulated stands"))]
+    pub ncut_voxel_height_m: f64,
+    /// For `ncut`: voxels further apart in the plane are not compared.
+    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    pub ncut_radius_m: f64,
+    /// For `ncut`: scale on which the likeness of voxels falls off in the plane.
+    #[schemars(range(min = 0.1, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    pub ncut_sigma_xy_m: f64,
+    /// For `ncut`: scale on which it falls off in height.
+    #[schemars(range(min = 0.1, max = 100.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    pub ncut_sigma_z_m: f64,
+    /// For `ncut`: scale on which it falls off with the distance from the nearest treetop.
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    pub ncut_sigma_top_m: f64,
+    /// For `ncut`: a cut with a larger normalised value is not made.
+    #[schemars(range(min = 0.0, max = 2.0), extend("x-source" = "Reitberger et al. 2009: 0.16"))]
+    pub ncut_threshold: f64,
+    /// For `ncut`: fewest voxels of what the static threshold cuts off.
+    #[schemars(range(min = 1, max = 10000), extend("x-source" = "this program"))]
+    pub ncut_min_voxels: u32,
 }
 
 impl Default for SegmentationParams {
@@ -126,6 +152,14 @@ impl Default for SegmentationParams {
             li_gap_high_m: 2.0,
             li_split_height_m: 15.0,
             li_radius_m: 10.0,
+            ncut_voxel_m: 0.75,
+            ncut_voxel_height_m: 1.5,
+            ncut_radius_m: 2.5,
+            ncut_sigma_xy_m: 1.35,
+            ncut_sigma_z_m: 5.0,
+            ncut_sigma_top_m: 2.0,
+            ncut_threshold: 0.16,
+            ncut_min_voxels: 5,
         }
     }
 }
@@ -140,7 +174,8 @@ impl SegmentationParams {
                 Some(("raster_radius_m", self.raster_radius_m))
             }
             SegmentMethod::Li => Some(("li_radius_m", self.li_radius_m)),
-            SegmentMethod::Starsac => None,
+            // Neither goes beyond `reach_m`.
+            SegmentMethod::Starsac | SegmentMethod::Ncut => None,
         };
         let too_far = radius.filter(|(_, radius_m)| *radius_m > self.reach_m);
         let fault = |(name, radius_m): (&str, f64)| {

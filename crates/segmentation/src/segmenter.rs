@@ -1,6 +1,6 @@
 //! What a segmenter is given and what it gives back.
 
-use crate::methods::{Li, RasterSegmenter, StarSac};
+use crate::methods::{Li, Ncut, RasterSegmenter, StarSac};
 use crate::{Claim, Crown, Error, SegmentMethod, SegmentationParams};
 use timberline_pointcloud::Frame;
 
@@ -137,5 +137,6 @@ pub fn segmenter(params: &SegmentationParams) -> Box<dyn Segmenter> {
             Box::new(RasterSegmenter { params: params.clone() })
         }
         SegmentMethod::Li => Box::new(Li { params: params.clone() }),
+        SegmentMethod::Ncut => Box::new(Ncut { params: params.clone() }),
     }
 }

@@ -12,12 +12,13 @@ use timberline_segmentation::stage::SegmentationStage;
 use timberline_segmentation::{SegmentMethod, SegmentationParams};
 
 /// All that the program has built in.
-const METHODS: [SegmentMethod; 5] = [
+const METHODS: [SegmentMethod; 6] = [
     SegmentMethod::Starsac,
     SegmentMethod::Watershed,
     SegmentMethod::Dalponte,
     SegmentMethod::Silva,
     SegmentMethod::Li,
+    SegmentMethod::Ncut,
 ];
 
 const CORNER: [f64; 3] = [500_000.0, 4_200_000.0, 80.0];

@@ -5,7 +5,7 @@ use super::plot::Plot;
 use crate::Error;
 use timberline_segmentation::{
     Claim, LiParams, Marker, SegmentMethod, SegmentationParams, Segments, View, methods::li,
-    segment_in_blocks, segmenter,
+    methods::ncut, segment_in_blocks, segmenter,
 };
 
 /// A tree found, with its position in the world and the height of its top above ground, m.
@@ -83,6 +83,16 @@ pub fn methods() -> Vec<Method> {
             |view| li::trees(view.x, view.y, view.height_m, &LiParams::default()),
             "li-own",
             "the same with the paper's parameters, which finds its trees itself",
+        ),
+        given(
+            SegmentMethod::Ncut,
+            "ncut",
+            "normalized cut of a graph of voxels (Reitberger et al. 2009)",
+        ),
+        own(
+            |view| ncut::trees(view, 3.0, 2.0, &SegmentationParams::default()),
+            "ncut-own",
+            "the same, which finds its trees itself",
         ),
     ]
 }

@@ -20,7 +20,7 @@ mod segmenter;
 
 pub use segmenter::{Li, grow};
 
-use crate::{Error, SegmentationParams, Segments};
+use crate::{Error, SegmentationParams, Segments, View};
 use growth::Growth;
 use pool::Pool;
 
@@ -103,6 +103,15 @@ impl Ranked {
         let height_m = index.iter().map(|&i| f64::from(height_m[i as usize])).collect();
         Self { x: column(x), y: column(y), height_m, index }
     }
+}
+
+/// Points at least `min_top_m` high without a higher one within `window_m` in the plane, from the
+/// highest down.
+#[must_use]
+pub fn tops(view: &View<'_>, window_m: f64, min_top_m: f64) -> Vec<u32> {
+    let ranked = Ranked::new(view.x, view.y, view.height_m, min_top_m);
+    let maxima = maxima::local_maxima(&ranked, window_m);
+    ranked.index.iter().zip(maxima).filter(|(_, is)| *is).map(|(index, _)| *index).collect()
 }
 
 /// Finds the trees of a cloud: coordinates in metres, heights above ground (NaN: no tree).
