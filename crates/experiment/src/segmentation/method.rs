@@ -48,53 +48,60 @@ enum How {
 
 type Find = fn(&View<'_>) -> Result<Segments, timberline_segmentation::Error>;
 
+/// Segmenters of the stage, with their names and what they do.
+const GIVEN: [(SegmentMethod, &str, &str); 6] = [
+    (
+        SegmentMethod::Starsac,
+        "starsac",
+        "surface and volume of the crown models (Tittmann et al. 2011)",
+    ),
+    (
+        SegmentMethod::Watershed,
+        "watershed",
+        "marker-controlled watershed on a pit-free canopy height model (Meyer 1994)",
+    ),
+    (
+        SegmentMethod::Dalponte,
+        "dalponte",
+        "region growing on a pit-free canopy height model (Dalponte and Coomes 2016)",
+    ),
+    (
+        SegmentMethod::Silva,
+        "silva",
+        "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)",
+    ),
+    (
+        SegmentMethod::Li,
+        "li",
+        "growing from the top down by spacing in the plane (Li et al. 2012), all trees at once",
+    ),
+    (
+        SegmentMethod::Ncut,
+        "ncut",
+        "normalized cut of a graph of voxels (Reitberger et al. 2009), one part for every tree",
+    ),
+];
+
+/// Those that find trees themselves.
+const OWN: [(Find, &str, &str); 2] = [
+    (
+        |view| li::trees(view.x, view.y, view.height_m, &LiParams::default()),
+        "li-own",
+        "Li et al. 2012 with the paper's parameters, which finds its trees itself",
+    ),
+    (
+        |view| ncut::trees(view, 3.0, 2.0, &SegmentationParams::default()),
+        "ncut-own",
+        "normalized cut that ends at a fixed threshold, which finds its trees itself",
+    ),
+];
+
 /// All ways to segment, in the sequence of the tables.
 #[must_use]
 pub fn methods() -> Vec<Method> {
-    let given = |method, name, about| Method { name, about, how: How::Given(method) };
-    let own = |find: Find, name, about| Method { name, about, how: How::Own(find) };
-    vec![
-        given(
-            SegmentMethod::Starsac,
-            "starsac",
-            "surface and volume of the crown models (Tittmann et al. 2011)",
-        ),
-        given(
-            SegmentMethod::Watershed,
-            "watershed",
-            "marker-controlled watershed on a pit-free canopy height model (Meyer 1994)",
-        ),
-        given(
-            SegmentMethod::Dalponte,
-            "dalponte",
-            "region growing on a pit-free canopy height model (Dalponte and Coomes 2016)",
-        ),
-        given(
-            SegmentMethod::Silva,
-            "silva",
-            "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)",
-        ),
-        given(
-            SegmentMethod::Li,
-            "li",
-            "growing from the top down by spacing in the plane (Li et al. 2012)",
-        ),
-        own(
-            |view| li::trees(view.x, view.y, view.height_m, &LiParams::default()),
-            "li-own",
-            "the same with the paper's parameters, which finds its trees itself",
-        ),
-        given(
-            SegmentMethod::Ncut,
-            "ncut",
-            "normalized cut of a graph of voxels (Reitberger et al. 2009)",
-        ),
-        own(
-            |view| ncut::trees(view, 3.0, 2.0, &SegmentationParams::default()),
-            "ncut-own",
-            "the same, which finds its trees itself",
-        ),
-    ]
+    let given = GIVEN.map(|(method, name, about)| Method { name, about, how: How::Given(method) });
+    let own = OWN.map(|(find, name, about)| Method { name, about, how: How::Own(find) });
+    given.into_iter().chain(own).collect()
 }
 
 /// The way of a name.
