@@ -20,6 +20,8 @@ pub const RAW: &str = "raw";
 pub const GRID: &str = "grid";
 /// The kind of input references that stand for a CRS given in the campaign file.
 pub const CRS: &str = "crs";
+/// The kind of input references that stand for a file named in the pipeline file.
+pub const NAMED: &str = "named";
 
 /// A list of stages.
 #[derive(Clone, Default)]

@@ -17,13 +17,18 @@ pub struct Alone {
     pub campaign: Campaign,
     /// The artefacts so far; a stage finds its inputs among them.
     pub files: Vec<InputFile>,
+    /// Where the files are that parameters name.
+    pub named: BTreeMap<String, PathBuf>,
+    /// What stages said to the log of the run.
+    pub log: Vec<String>,
 }
 
 impl Alone {
     /// Begins in a folder.
     #[must_use]
     pub fn new(folder: &Path, campaign: Campaign) -> Self {
-        Self { folder: folder.to_path_buf(), campaign, files: Vec::new() }
+        let (files, named, log) = (Vec::new(), BTreeMap::new(), Vec::new());
+        Self { folder: folder.to_path_buf(), campaign, files, named, log }
     }
 
     /// The folder for files that campaign stages write.
@@ -123,8 +128,11 @@ impl Alone {
         };
         let (outputs, cancel) = (self.outputs(), AtomicBool::new(false));
         std::fs::create_dir_all(&outputs)?;
-        let context = Context::new(&task, &self.campaign, &self.folder, &outputs, &cancel);
-        work(&context)?;
+        let context = Context::new(&task, &self.campaign, &self.folder, &outputs, &cancel)
+            .with_files(self.named.clone());
+        let worked = work(&context);
+        self.log.extend(context.take_log());
+        worked?;
         let published = context.publish(declared)?;
         let first = published.first().map(|(_, path)| path.clone());
         self.files.extend(published.into_iter().map(|(kind, path)| InputFile {

@@ -4,22 +4,25 @@
 //! range, default and source, in their JSON Schema) are read from the trait by everything else.
 
 use crate::container::ContainerWriter;
-use crate::publish::Staged;
+use crate::publish::{Staged, TEMP_PREFIX};
 use crate::{Error, Facts, Header, InputRef, Kind, UnitId, UnitKind, Warning};
 use schemars::JsonSchema;
 use serde::{Serialize, de::DeserializeOwned};
+use std::collections::BTreeMap;
 use std::io::{BufWriter, Write};
 use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use tempfile::TempDir;
 use timberline_pointcloud::{TileGrid, TileId};
 
 /// What a stage may return as an error: any error with a message fit for a user.
 pub type StageError = Box<dyn std::error::Error + Send + Sync>;
 
 /// Parameters of a stage: one flat struct whose JSON Schema carries range (`minimum`, `maximum`),
-/// unit (`x-unit`) and source (`x-source`) of every field.
+/// unit (`x-unit`) and source (`x-source`) of every field. A field marked `x-limit` only bounds what a
+/// task may take and can change no result: it is no part of the key.
 pub trait Params:
     Serialize + DeserializeOwned + JsonSchema + Default + Clone + Send + Sync + 'static
 {
@@ -86,6 +89,17 @@ pub struct StageInfo {
     pub outputs: &'static [&'static str],
 }
 
+/// A file that a parameter names: a script, a table. Its contents are part of the task's key.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct NamedFile {
+    /// As it stands in the parameter; a relative path counts from the pipeline file's folder.
+    pub name: String,
+    /// The parameter.
+    pub param: &'static str,
+    /// Whether it must be there. What may be a file's name or not is one if there is such a file.
+    pub required: bool,
+}
+
 /// One stage of a pipeline.
 pub trait Stage: Send + Sync + 'static {
     /// Its parameters.
@@ -97,6 +111,11 @@ pub trait Stage: Send + Sync + 'static {
     /// How far beyond its tile a task reads, in metres.
     fn halo_m(_params: &Self::Params) -> f64 {
         0.0
+    }
+
+    /// The files its parameters name, which a task finds by [`Context::file`].
+    fn files(_params: &Self::Params) -> Vec<NamedFile> {
+        Vec::new()
     }
 
     /// Estimate of a task's peak memory in bytes, given the number of points in its unit
@@ -273,6 +292,8 @@ pub struct Context<'a> {
     cancel: &'a AtomicBool,
     progress: AtomicU64,
     warnings: Mutex<Vec<Warning>>,
+    log: Mutex<Vec<String>>,
+    files: BTreeMap<String, PathBuf>,
     staged: Mutex<Vec<(&'static str, Staged)>>,
 }
 
@@ -293,8 +314,40 @@ impl<'a> Context<'a> {
         cancel: &'a AtomicBool,
     ) -> Self {
         let progress = AtomicU64::new(0);
-        let (warnings, staged) = (Mutex::default(), Mutex::default());
-        Self { task, campaign, store, outputs, cancel, progress, warnings, staged }
+        let (warnings, log, staged) = (Mutex::default(), Mutex::default(), Mutex::default());
+        let files = BTreeMap::new();
+        Self { task, campaign, store, outputs, cancel, progress, warnings, log, files, staged }
+    }
+
+    /// The same with the files that the stage's parameters name, by their names.
+    #[must_use]
+    pub fn with_files(mut self, files: BTreeMap<String, PathBuf>) -> Self {
+        self.files = files;
+        self
+    }
+
+    /// Where a file is that the parameters name (see [`Stage::files`]): an absolute path.
+    #[must_use]
+    pub fn file(&self, name: &str) -> Option<&Path> {
+        self.files.get(name).map(PathBuf::as_path)
+    }
+
+    /// The unit.
+    #[must_use]
+    pub fn unit(&self) -> &UnitId {
+        &self.task.unit
+    }
+
+    /// A folder for what the task needs only while it runs; it vanishes with the returned value. What
+    /// a killed process leaves there, the next run removes.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn scratch(&self) -> Result<TempDir, Error> {
+        let folder = self.store.join(&self.task.stage);
+        std::fs::create_dir_all(&folder).map_err(Error::io(&folder, "create"))?;
+        let made = tempfile::Builder::new().prefix(TEMP_PREFIX).tempdir_in(&folder);
+        made.map_err(Error::io(&folder, "write in"))
     }
 
     /// What the campaign has in common.
@@ -333,6 +386,18 @@ impl<'a> Context<'a> {
         let mut warnings = lock(&self.warnings).clone();
         warnings.sort();
         warnings
+    }
+
+    /// Adds a text to the log of the run, kept whether the task succeeds or fails: what a program
+    /// said that the task called. It is no part of any result.
+    pub fn log(&self, text: impl Into<String>) {
+        lock(&self.log).push(text.into());
+    }
+
+    /// The texts of [`Context::log`] so far, which are taken out.
+    #[must_use]
+    pub fn take_log(&self) -> Vec<String> {
+        std::mem::take(&mut *lock(&self.log))
     }
 
     /// Returns an error when the task should stop; long loops ask now and then.
@@ -464,6 +529,12 @@ pub trait DynStage: Send + Sync {
     /// As [`DynStage::effective`].
     fn halo_m(&self, effective: &serde_json::Value) -> Result<f64, String>;
 
+    /// See [`Stage::files`].
+    ///
+    /// # Errors
+    /// As [`DynStage::effective`].
+    fn files(&self, effective: &serde_json::Value) -> Result<Vec<NamedFile>, String>;
+
     /// See [`Stage::memory_bytes`].
     ///
     /// # Errors
@@ -515,6 +586,10 @@ impl<S: Stage> DynStage for Erased<S> {
 
     fn halo_m(&self, effective: &serde_json::Value) -> Result<f64, String> {
         Self::parse(effective).map(|params| S::halo_m(&params))
+    }
+
+    fn files(&self, effective: &serde_json::Value) -> Result<Vec<NamedFile>, String> {
+        Self::parse(effective).map(|params| S::files(&params))
     }
 
     fn memory_bytes(&self, effective: &serde_json::Value, points: u64) -> Result<u64, String> {

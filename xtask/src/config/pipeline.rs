@@ -4,7 +4,7 @@ use super::document::{Content, Node};
 use super::{Document, Place, Problem, Problems, check, nearest};
 use crate::registry::{AnyStage, Registry};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
 
 /// A pipeline in effect: every parameter has its value.
@@ -31,6 +31,10 @@ pub struct PipelineStage {
     pub places: BTreeMap<String, Place>,
     /// Where the stage's table stands, or its name in `stages`.
     pub at: Place,
+    /// The files its parameters name, by name: where they are.
+    pub files: BTreeMap<String, PathBuf>,
+    /// Its parameters that can change no result and are no part of a key.
+    pub limits: BTreeSet<String>,
 }
 
 /// Where an effective value comes from.
@@ -110,6 +114,16 @@ impl PipelineStage {
     #[must_use]
     pub fn name(&self) -> &'static str {
         self.stage.info().name
+    }
+
+    /// The parameters that are part of a key.
+    #[must_use]
+    pub fn key_params(&self) -> Value {
+        let mut params = self.params.clone();
+        if let Some(object) = params.as_object_mut() {
+            object.retain(|name, _| !self.limits.contains(name));
+        }
+        params
     }
 
     /// Where a parameter's value comes from.
@@ -262,7 +276,9 @@ fn resolve_stage(
     match crate::registry::effective(stage, &given) {
         Ok(params) => {
             let places = table.map(places).unwrap_or_default();
-            Some(PipelineStage { stage: stage.clone(), params, places, at })
+            let files = named_files(document, stage, &params, &places, at, found);
+            let limits = limits(&stage.schema());
+            Some(PipelineStage { stage: stage.clone(), params, places, at, files, limits })
         }
         Err(faults) => {
             let fault =
@@ -271,6 +287,40 @@ fn resolve_stage(
             None
         }
     }
+}
+
+/// The files that the parameters of a stage name; those that must be there and are not are faults.
+fn named_files(
+    document: &Document,
+    stage: &AnyStage,
+    params: &Value,
+    places: &BTreeMap<String, Place>,
+    at: Place,
+    found: &mut Vec<Problem>,
+) -> BTreeMap<String, PathBuf> {
+    let folder = document.path.parent().unwrap_or(Path::new(""));
+    let folder = std::path::absolute(folder.join(".")).unwrap_or_else(|_| folder.to_owned());
+    let mut files = BTreeMap::new();
+    for named in stage.files(params).unwrap_or_default() {
+        let path = folder.join(&named.name);
+        if path.exists() {
+            files.insert(named.name, path);
+        } else if named.required {
+            let what = format!("`{}` names `{}`: there is no such file", named.param, named.name);
+            let hint = format!("relative paths count from {}", folder.display());
+            let place = places.get(named.param).copied().unwrap_or(at);
+            found.push(Problem::new(&document.path, Some(place), what).hint(Some(hint)));
+        }
+    }
+    files
+}
+
+/// The parameters that a schema marks as limits.
+fn limits(schema: &Value) -> BTreeSet<String> {
+    let properties = schema.get("properties").and_then(Value::as_object);
+    let marked = |property: &Value| property.get("x-limit") == Some(&Value::Bool(true));
+    let marked = properties.into_iter().flatten().filter(|(_, property)| marked(property));
+    marked.map(|(name, _)| name.clone()).collect()
 }
 
 fn places(table: &Node) -> BTreeMap<String, Place> {

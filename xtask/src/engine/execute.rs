@@ -108,6 +108,14 @@ struct Ended {
     seconds: f64,
     known: Known,
     error: Option<String>,
+    log: Vec<String>,
+}
+
+impl Ended {
+    /// A unit that this run did not run.
+    fn without_running(outcome: Outcome, known: Known, error: Option<String>) -> Self {
+        Self { outcome, seconds: 0.0, known, error, log: Vec::new() }
+    }
 }
 
 impl Runner<'_> {
@@ -336,12 +344,7 @@ impl Pass<'_> {
                 ended
             },
         );
-        let not_begun = || Ended {
-            outcome: Outcome::NotRun,
-            seconds: 0.0,
-            known: Known::default(),
-            error: None,
-        };
+        let not_begun = || Ended::without_running(Outcome::NotRun, Known::default(), None);
         done.into_iter().map(|ended| ended.unwrap_or_else(not_begun)).collect()
     }
 
@@ -349,18 +352,11 @@ impl Pass<'_> {
     fn not_run(&self, position: usize, plan: &UnitPlan) -> Option<Ended> {
         let selection = &self.runner.options.selection;
         let ended = match &plan.found {
-            Found::Whole(known) => {
-                Ended { outcome: Outcome::Cached, seconds: 0.0, known: known.clone(), error: None }
-            }
+            Found::Whole(known) => Ended::without_running(Outcome::Cached, known.clone(), None),
             _ if !selection.is_active(position, plan.unit()) => return None,
             _ => {
                 let error = format!("not there: {}", plan.absent.join(", "));
-                Ended {
-                    outcome: Outcome::Blocked,
-                    seconds: 0.0,
-                    known: Known::default(),
-                    error: Some(error),
-                }
+                Ended::without_running(Outcome::Blocked, Known::default(), Some(error))
             }
         };
         self.log.write(&Event::Unit(record(plan, &ended)));
@@ -381,34 +377,39 @@ impl Pass<'_> {
         let (runner, info) = (self.runner, stage.stage.info());
         let lock = UnitLock::acquire(&runner.work.lock(info.name, &plan.unit().file_stem()));
         let force = runner.options.selection.only.is_some();
-        let ended = |outcome, known, error| Ended {
-            outcome,
-            seconds: begun.elapsed().as_secs_f64(),
-            known,
-            error,
+        let failed = |error| (Outcome::Failed, Known::default(), Some(error));
+        let found = || runner.store.find(&info, plan.unit(), &plan.task.key);
+        let mut log = Vec::new();
+        let (outcome, known, error) = match (&lock, force) {
+            (Err(error), _) => failed(format!("no lock: {error}")),
+            (Ok(_), false) if let Found::Whole(known) = found() => (Outcome::Reused, known, None),
+            (Ok(_), _) => {
+                let (result, said) = self.attempt(stage, plan);
+                log = said;
+                self.judge(stage, plan, result)
+            }
         };
-        if let Err(error) = &lock {
-            return ended(Outcome::Failed, Known::default(), Some(format!("no lock: {error}")));
-        }
-        if let (false, Found::Whole(known)) =
-            (force, runner.store.find(&info, plan.unit(), &plan.task.key))
-        {
-            return ended(Outcome::Reused, known, None);
-        }
-        match self.attempt(stage, plan) {
+        Ended { outcome, seconds: begun.elapsed().as_secs_f64(), known, error, log }
+    }
+
+    fn judge(
+        &self,
+        stage: &PipelineStage,
+        plan: &UnitPlan,
+        result: Result<(), StageError>,
+    ) -> (Outcome, Known, Option<String>) {
+        let (runner, info) = (self.runner, stage.stage.info());
+        let failed = |error| (Outcome::Failed, Known::default(), Some(error));
+        match result {
             Ok(()) => match runner.store.find(&info, plan.unit(), &plan.task.key) {
-                Found::Whole(known) => ended(Outcome::Done, known, None),
-                Found::Missing => {
-                    ended(Outcome::Failed, Known::default(), Some("its artefacts vanished".into()))
-                }
-                Found::Corrupt { error, .. } => {
-                    ended(Outcome::Failed, Known::default(), Some(error))
-                }
+                Found::Whole(known) => (Outcome::Done, known, None),
+                Found::Missing => failed("its artefacts vanished".to_owned()),
+                Found::Corrupt { error, .. } => failed(error),
             },
             Err(error)
                 if runner.stopped() && chain(error.as_ref()).contains(&Cancelled.to_string()) =>
             {
-                ended(Outcome::NotRun, Known::default(), None)
+                (Outcome::NotRun, Known::default(), None)
             }
             Err(error) => {
                 self.look_for_corruption(plan);
@@ -418,12 +419,17 @@ impl Pass<'_> {
                 }
                 let text = chain(error.as_ref());
                 runner.progress.warn(&format!("{}/{} failed: {text}", info.name, plan.unit()));
-                ended(Outcome::Failed, Known::default(), Some(text))
+                failed(text)
             }
         }
     }
 
-    fn attempt(&self, stage: &PipelineStage, plan: &UnitPlan) -> Result<(), StageError> {
+    /// Runs the stage; second, what was said for the log.
+    fn attempt(
+        &self,
+        stage: &PipelineStage,
+        plan: &UnitPlan,
+    ) -> (Result<(), StageError>, Vec<String>) {
         let runner = self.runner;
         let inputs = Inputs::new(plan.unit().clone(), plan.raw.clone(), plan.files.clone());
         let outputs = runner.work.outputs();
@@ -434,14 +440,20 @@ impl Pass<'_> {
             &outputs,
             runner.cancel,
         );
+        let context = context.with_files(stage.files.clone());
         let task = || {
             let run = || stage.stage.run(&stage.params, &inputs, &context);
             watched(runner.progress, plan, || context.progress(), run)
         };
-        catch_unwind(AssertUnwindSafe(task))
-            .unwrap_or_else(|payload| Err(panics::describe(&*payload).into()))?;
-        context.publish(stage.stage.info().outputs)?;
-        Ok(())
+        let ran = catch_unwind(AssertUnwindSafe(task))
+            .unwrap_or_else(|payload| Err(panics::describe(&*payload).into()));
+        let log = context.take_log();
+        let publish = || {
+            check_named(plan)?;
+            context.publish(stage.stage.info().outputs)?;
+            Ok(())
+        };
+        (ran.and_then(|()| publish()), log)
     }
 
     /// Whether a unit failed because something it read was damaged after it was checked.
@@ -452,6 +464,16 @@ impl Pass<'_> {
                 self.log.write(&Event::Corrupt { path: file.path.clone(), error });
                 self.again.store(true, Ordering::SeqCst);
             }
+        }
+    }
+}
+
+/// The key was made from the files as they were before the unit ran.
+fn check_named(plan: &UnitPlan) -> Result<(), StageError> {
+    match plan.named.iter().find(|named| !named.is_unchanged()) {
+        None => Ok(()),
+        Some(named) => {
+            Err(format!("{} was changed meanwhile; run again", named.path.display()).into())
         }
     }
 }
@@ -487,6 +509,7 @@ fn record(plan: &UnitPlan, ended: &Ended) -> UnitRecord {
         warnings: ended.known.warnings,
         error: ended.error.clone(),
         inputs: if ended.error.is_some() { inputs.collect() } else { Vec::new() },
+        log: ended.log.clone(),
     }
 }
 

@@ -4,7 +4,7 @@ use super::plan::{Made, Progressed, Standing, UnitPlan, plan_stage};
 use super::store::{Entry, Found, Store};
 use super::survey::Survey;
 use crate::config::{Pipeline, PipelineStage, Place, Source};
-use crate::registry::{CRS, GRID, RAW};
+use crate::registry::{CRS, GRID, NAMED, RAW};
 use serde::Serialize;
 use serde_json::Value;
 use std::cell::{OnceCell, RefCell};
@@ -276,7 +276,9 @@ fn param_differences(stage: &PipelineStage, old: &Value, new: &Value) -> Vec<Dif
     let none = serde_json::Map::new();
     let (old, new) = (old.as_object().unwrap_or(&none), new.as_object().unwrap_or(&none));
     let names: std::collections::BTreeSet<&String> = old.keys().chain(new.keys()).collect();
-    let differ = names.into_iter().filter(|name| old.get(*name) != new.get(*name));
+    let differ = names
+        .into_iter()
+        .filter(|name| old.get(*name) != new.get(*name) && !stage.limits.contains(*name));
     let mut found: Vec<Difference> = differ
         .map(|name| Difference::Param {
             name: name.clone(),
@@ -306,7 +308,7 @@ fn input_differences(old: &[InputRef], new: &[InputRef]) -> Vec<Difference> {
             new: now.clone(),
         })
     });
-    let own = |kind: &str| matches!(kind, RAW | GRID | CRS);
+    let own = |kind: &str| matches!(kind, RAW | GRID | CRS | NAMED);
     let mut found: Vec<Difference> = added
         .map(|(kind, unit)| Difference::InputAdded { kind: kind.clone(), unit: unit.clone() })
         .chain(removed.map(|(kind, unit)| Difference::InputRemoved {
@@ -367,6 +369,15 @@ pub fn difference_words(stage: &PipelineStage, file: &Path, difference: &Differe
         Difference::InputRemoved { kind, .. } if kind == CRS => {
             "[crs] was taken out of the campaign file".to_owned()
         }
+        Difference::InputAdded { kind, unit } if kind == NAMED => {
+            format!("[{}] now names the file {}", stage.name(), name_of(unit))
+        }
+        Difference::InputRemoved { kind, unit } if kind == NAMED => {
+            format!("[{}] no longer names the file {}", stage.name(), name_of(unit))
+        }
+        Difference::InputChanged { kind, unit, .. } if kind == NAMED => {
+            format!("contents of {}, named in [{}], changed", name_of(unit), stage.name())
+        }
         Difference::InputAdded { kind, unit } => format!("input added: {kind} of {unit}"),
         Difference::InputRemoved { kind, unit } => format!("input removed: {kind} of {unit}"),
         Difference::InputChanged { kind, old, new, .. } if kind == GRID => {
@@ -380,6 +391,11 @@ pub fn difference_words(stage: &PipelineStage, file: &Path, difference: &Differe
         }
         Difference::InputChanged { kind, unit, .. } => format!("input changed: {kind} of {unit}"),
     }
+}
+
+/// A file's own name.
+fn name_of(unit: &UnitId) -> String {
+    if let UnitId::File(name) = unit { name.clone() } else { unit.to_string() }
 }
 
 fn param_words(

@@ -3,13 +3,15 @@
 //! A key is known before anything runs, because it depends on the keys of the inputs and not on
 //! their contents. So the same code plans (nothing runs) and runs (stage by stage).
 
+use super::notes::{Stamp, content_hash};
 use super::store::{Found, KEY_LEN, Store};
 use super::survey::Survey;
 use crate::config::{Pipeline, PipelineStage};
-use crate::registry::{CRS, GRID, RAW};
+use crate::registry::{CRS, GRID, NAMED, RAW};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use timberline_artefact::container::CONTAINER_VERSION;
 use timberline_artefact::kinds;
 use timberline_artefact::stage::{InputFile, InputSpec, RawFile, Scope, Task};
@@ -64,6 +66,37 @@ pub struct UnitPlan {
     pub losses: Vec<String>,
     /// Tiles it would hold points for, by the extent of its raw file.
     pub expected_parts: Vec<TileId>,
+    /// The files that its stage's parameters name.
+    pub named: Arc<[Named]>,
+}
+
+/// A file that a stage's parameters name, as it was when the stage was planned.
+#[derive(Debug, Clone)]
+pub struct Named {
+    /// As it stands in the pipeline file.
+    pub name: String,
+    /// Where it is.
+    pub path: PathBuf,
+    stamp: Option<Stamp>,
+    hash: String,
+}
+
+impl Named {
+    fn look(name: &str, path: &Path) -> Self {
+        let stamp = Stamp::of(path);
+        let hash = match path.is_dir() {
+            true => "a folder, whose contents do not count".to_owned(),
+            false => content_hash(path).unwrap_or_else(|error| format!("unreadable: {error}")),
+        };
+        Self { name: name.to_owned(), path: path.to_owned(), stamp, hash }
+    }
+
+    /// Whether the file is still what it was when the stage was planned.
+    #[must_use]
+    pub fn is_unchanged(&self) -> bool {
+        let touched = self.stamp.is_none() || self.stamp != Stamp::of(&self.path);
+        !touched || Self::look(&self.name, &self.path).hash == self.hash
+    }
 }
 
 impl UnitPlan {
@@ -102,6 +135,7 @@ struct Planner<'a> {
     store: &'a Store,
     before: &'a Progressed,
     halo_m: Result<f64, String>,
+    named: Arc<[Named]>,
     /// The raw files with points in a tile, for every stage before that works on raw files.
     by_tile: BTreeMap<usize, BTreeMap<TileId, Vec<Source<'a>>>>,
 }
@@ -120,7 +154,9 @@ impl<'a> Planner<'a> {
         let stage = &pipeline.stages[position];
         let halo_m = stage.stage.halo_m(&stage.params);
         let by_tile = BTreeMap::new();
-        let mut planner = Self { pipeline, position, survey, store, before, halo_m, by_tile };
+        let named = stage.files.iter().map(|(name, path)| Named::look(name, path)).collect();
+        let mut planner =
+            Self { pipeline, position, survey, store, before, halo_m, named, by_tile };
         let froms: BTreeSet<usize> = planner.inputs().map(|(_, from)| from).collect();
         for from in froms {
             if planner.kind_of(from) != UnitKind::File {
@@ -189,6 +225,11 @@ impl<'a> Planner<'a> {
         if info.unit == UnitKind::File {
             self.take_raw(&mut draft, &unit, file.map(|file| file.hash.clone()));
         }
+        draft.refs.extend(self.named.iter().map(|named| InputRef {
+            kind: NAMED.to_owned(),
+            unit: UnitId::File(named.name.clone()),
+            key: named.hash.clone(),
+        }));
         draft.refs.sort();
         let most = |points: &BTreeMap<_, u64>| points.values().copied().max().unwrap_or(0);
         let in_file = file.map(|file| file.facts.points);
@@ -218,6 +259,7 @@ impl<'a> Planner<'a> {
             points,
             absent: draft.absent,
             losses: draft.losses,
+            named: Arc::clone(&self.named),
         })
     }
 
@@ -334,7 +376,7 @@ fn key(stage: &PipelineStage, unit: &UnitId, refs: &[InputRef]) -> String {
             add(&format!("{kind} {version}"));
         }
     }
-    add(&canonical(&stage.params));
+    add(&canonical(&stage.key_params()));
     for input in refs {
         add(&input.kind);
         add(&input.unit.to_string());

@@ -72,6 +72,9 @@ pub struct UnitRecord {
     /// Files it read, given where it failed, so that it can be replayed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub inputs: Vec<PathBuf>,
+    /// What programs said that the unit called.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub log: Vec<String>,
 }
 
 /// A finished stage.

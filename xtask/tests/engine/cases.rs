@@ -3,6 +3,7 @@
 use crate::support::{PIPELINE, Stand, row_text, tile};
 use std::collections::BTreeMap;
 use std::path::Path;
+use xtask::engine::runlog::{self, Event};
 
 fn counts(pairs: &[(&str, u64)]) -> BTreeMap<String, u64> {
     pairs.iter().map(|(stage, count)| ((*stage).to_owned(), *count)).collect()
@@ -76,6 +77,77 @@ fn a_removed_parameter_is_named() {
     {
         assert!(why.contains(part), "{part} in {why}");
     }
+}
+
+/// A stand whose stage `sum` reads a file, run once.
+fn ran_with_script() -> Stand {
+    let stand = Stand::new();
+    stand.write("pipeline.toml", &format!("{PIPELINE}script = \"scripts/a.txt\"\n"));
+    std::fs::create_dir(stand.path("scripts")).unwrap();
+    stand.write("scripts/a.txt", "one");
+    assert_eq!(stand.run(&[]).code, 0);
+    stand
+}
+
+/// What units of `sum` said in the last run, by unit.
+fn said(stand: &Stand) -> BTreeMap<String, Vec<String>> {
+    let runs = stand.path(".timberline/runs");
+    let id = runlog::list(&runs).pop().unwrap();
+    let units = runlog::read(&runs, &id).unwrap().into_iter().filter_map(|event| match event {
+        Event::Unit(unit) if unit.stage == "sum" => Some((unit.unit, unit.log)),
+        _ => None,
+    });
+    units.collect()
+}
+
+#[test]
+fn a_changed_script_runs_its_stage_and_what_follows() {
+    let stand = ran_with_script();
+    stand.write("scripts/a.txt", "one");
+    assert_eq!(Stand::done(&stand.run(&[])), BTreeMap::new(), "touched, not changed");
+    stand.write("scripts/a.txt", "two");
+    assert_eq!(plan(&stand, "scan", &[]).0, 0);
+    let (to_run, why) = plan(&stand, "sum", &[]);
+    assert!(
+        to_run == 16 && why.contains("contents of scripts/a.txt, named in [sum], changed"),
+        "{why}"
+    );
+    let (_, why) = plan(&stand, "blur", &[]);
+    assert!(why.contains("follows `sum`: contents of scripts/a.txt"), "{why}");
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("sum", 16), ("blur", 16), ("finish", 1)]));
+    stand.write("pipeline.toml", PIPELINE);
+    let (_, why) = plan(&stand, "sum", &[]);
+    assert!(why.contains("parameter `script`"), "{why}");
+}
+
+#[test]
+fn a_missing_script_is_a_fault_of_the_pipeline_file() {
+    let stand = ran_with_script();
+    std::fs::remove_file(stand.path("scripts/a.txt")).unwrap();
+    let ran = stand.run(&[]);
+    let expected = "pipeline.toml:7:1: `script` names `scripts/a.txt`: there is no such file\n    \
+        relative paths count from";
+    assert!(ran.code == 2 && ran.stderr.contains(expected), "{}", ran.stderr);
+}
+
+#[test]
+fn what_programs_say_is_in_the_log_of_the_run() {
+    let stand = ran_with_script();
+    let all = said(&stand);
+    assert_eq!(all.len(), 16);
+    assert!(all.values().all(|said| said == &["the script says one"]), "{all:?}");
+    stand.write("scripts/a.txt", "three");
+    let pipeline = stand.path("pipeline.toml");
+    let ran = stand.xtask(&["run", pipeline.to_str().unwrap()], &[("XTASK_TEST_FAIL", "tile:0_0")]);
+    assert_eq!(ran.code, 3, "{}", ran.stderr);
+    assert_eq!(said(&stand)["tile:0_0"], ["the script says three"], "also where it failed");
+}
+
+#[test]
+fn a_limit_is_no_part_of_the_key() {
+    let stand = ran_once();
+    stand.write("pipeline.toml", &format!("{PIPELINE}limit_s = 5\n"));
+    assert_eq!(Stand::done(&stand.run(&[])), BTreeMap::new());
 }
 
 #[test]

@@ -11,7 +11,7 @@ use std::time::Duration;
 use timberline_artefact::container::ContainerReader;
 use timberline_artefact::kinds::{Heights, Labels, OutputFile, Outputs, Shards};
 use timberline_artefact::stage::{
-    Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo, erase,
+    Context, InputSpec, Inputs, NamedFile, Params, Stage, StageError, StageInfo, erase,
 };
 use timberline_artefact::{Facts, Kind, UnitKind};
 use timberline_pointcloud::{Rect, TileId};
@@ -36,10 +36,15 @@ pub(crate) struct Scale {
     /// What is added to them.
     #[schemars(range(min = -1.0, max = 1.0), extend("x-unit" = "m"))]
     pub(crate) offset_m: f64,
+    /// A file that is read; none if empty.
+    pub(crate) script: String,
+    /// How long a unit may take.
+    #[schemars(range(min = 1.0), extend("x-unit" = "s", "x-limit" = true))]
+    pub(crate) limit_s: f64,
 }
 impl Default for Scale {
     fn default() -> Self {
-        Self { factor: 1.0, offset_m: 0.0 }
+        Self { factor: 1.0, offset_m: 0.0, script: String::new(), limit_s: 9.0 }
     }
 }
 impl Params for Scale {
@@ -123,7 +128,14 @@ impl<const VERSION: u32> Stage for Sum<VERSION> {
             outputs,
         }
     }
+    fn files(params: &Scale) -> Vec<NamedFile> {
+        let named = NamedFile { name: params.script.clone(), param: "script", required: true };
+        Some(named).filter(|named| !named.name.is_empty()).into_iter().collect()
+    }
     fn run(params: &Scale, inputs: &Inputs, context: &Context<'_>) -> Result<(), StageError> {
+        if let Some(path) = context.file(&params.script) {
+            context.log(format!("the script says {}", std::fs::read_to_string(path)?));
+        }
         trip(inputs)?;
         let tile = inputs.tile()?.to_string();
         let mut height_m = Vec::new();
