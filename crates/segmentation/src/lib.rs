@@ -4,6 +4,7 @@
 //! several ([`SegmentMethod`]), all behind one trait and none dependent on how the points are cut
 //! into tiles or in which sequence they and the trees come: [`StarSac`] asks the crown models
 //! around a point, and nothing else; the others work in squares fixed in the world ([`blocks`]).
+//! A program of the user's can take their place ([`hook`]).
 //!
 //! What users of a tree id expect, and get: a point of the ground, of herbs and shrubs below
 //! `min_height_m`, and of everything above or beyond the crowns has 0; a point of the canopy has
@@ -14,10 +15,12 @@ pub mod blocks;
 pub mod chm;
 pub mod claim;
 pub mod error;
+pub mod hook;
 pub mod methods;
 pub mod params;
 pub mod segmenter;
 pub mod stage;
+pub mod surface;
 
 pub use blocks::segment_in_blocks;
 pub use chm::{Chm, PitFree};
@@ -26,3 +29,4 @@ pub use error::Error;
 pub use methods::{Li, LiParams, Ncut, NcutParams, RasterSegmenter, Seed, Segments, StarSac};
 pub use params::{Membership, SegmentMethod, SegmentationParams};
 pub use segmenter::{Marker, Piece, Segmenter, View, segmenter};
+pub use surface::surface_scores;

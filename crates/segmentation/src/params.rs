@@ -127,6 +127,21 @@ pub struct SegmentationParams {
     /// For `ncut`: fewest voxels of what the static threshold cuts off.
     #[schemars(range(min = 1, max = 10000), extend("x-source" = "this program"))]
     pub ncut_min_voxels: u32,
+    /// A program that takes the place of `method`: its words, such as `["python3", "hooks/x.py"]`; empty
+    /// for none. Files among them count from the pipeline file's folder. See pipelines/hooks/README.md.
+    pub command: Vec<String>,
+    /// For `command`: its version. Change it whenever its answer could change for a reason that is not
+    /// in the files named in `command`, whose contents count anyway.
+    pub command_version: String,
+    /// For `command`: surroundings of a tile that it is given besides, at least the largest crown radius.
+    #[schemars(range(min = 0.0, max = 200.0), extend("x-unit" = "m", "x-source" = "this program"))]
+    pub command_halo_m: f64,
+    /// For `command`: it is killed when it has not ended after this time.
+    #[schemars(range(min = 1, max = 604_800), extend("x-unit" = "s", "x-source" = "this program", "x-limit" = true))]
+    pub command_time_limit_s: u32,
+    /// For `command`: it is killed when it and all it started hold more memory.
+    #[schemars(range(min = 10, max = 1_000_000), extend("x-unit" = "MB", "x-source" = "this program", "x-limit" = true))]
+    pub command_memory_limit_mb: u32,
 }
 
 impl Default for SegmentationParams {
@@ -160,6 +175,11 @@ impl Default for SegmentationParams {
             ncut_sigma_top_m: 2.0,
             ncut_threshold: 0.16,
             ncut_min_voxels: 5,
+            command: Vec::new(),
+            command_version: String::new(),
+            command_halo_m: 15.0,
+            command_time_limit_s: 600,
+            command_memory_limit_mb: 2000,
         }
     }
 }

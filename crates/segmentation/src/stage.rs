@@ -1,12 +1,14 @@
 //! The stage `segmentation`: the only place here that reads and writes artefacts.
 
+mod program;
+
 use crate::blocks::{room_m, segment_in_blocks, sort_markers};
 use crate::{Claim, Crown, Marker, SegmentationParams, Segmenter, View, segmenter};
 use timberline_artefact::kinds::{
-    CrownShape, CrownStatus, Detection, Detections, Heights, Labels, PointTile,
+    CrownShape, CrownStatus, Detection, Detections, GroundPoints, Heights, Labels, PointTile,
 };
 use timberline_artefact::stage::{
-    Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
+    Context, InputSpec, Inputs, NamedFile, Params, Stage, StageError, StageInfo,
 };
 use timberline_artefact::{Aligned, Error, Kind, Surroundings, UnitKind, gather, read_header};
 use timberline_pointcloud::{Frame, Rect};
@@ -23,6 +25,7 @@ impl Params for SegmentationParams {
 
 const INPUTS: &[InputSpec] = &[
     InputSpec::halo(PointTile::NAME),
+    InputSpec::halo(GroundPoints::NAME),
     InputSpec::halo(Heights::NAME),
     InputSpec::halo(Detections::NAME),
 ];
@@ -34,7 +37,7 @@ impl Stage for SegmentationStage {
         StageInfo {
             name: "segmentation",
             version: 3,
-            summary: "the tree of every point, given the trees: see `method`",
+            summary: "the tree of every point, given the trees: see `method` and `command`",
             unit: UnitKind::Tile,
             inputs: INPUTS,
             outputs: &[Labels::NAME],
@@ -42,9 +45,26 @@ impl Stage for SegmentationStage {
     }
 
     fn halo_m(params: &Self::Params) -> f64 {
+        if !params.command.is_empty() {
+            return params.command_halo_m;
+        }
         let segmenter = segmenter(params);
         let room_m = if segmenter.is_local() { 0.0 } else { f64::from(params.block_m) };
         segmenter.reach_m() + room_m
+    }
+
+    fn files(params: &Self::Params) -> Vec<NamedFile> {
+        let files = crate::hook::named_files(&params.command).into_iter();
+        files.map(|(name, required)| NamedFile { name, param: "command", required }).collect()
+    }
+
+    fn memory_bytes(params: &Self::Params, points: u64) -> u64 {
+        const BYTES_PER_POINT: u64 = 300;
+        let program = match params.command.is_empty() {
+            true => 0,
+            false => u64::from(params.command_memory_limit_mb) * 1_000_000,
+        };
+        points * BYTES_PER_POINT + program
     }
 
     fn run(
@@ -52,13 +72,10 @@ impl Stage for SegmentationStage {
         inputs: &Inputs,
         context: &Context<'_>,
     ) -> Result<(), StageError> {
-        let segmenter = segmenter(params);
-        let halo_m = needed_m(&*segmenter, params, &tile_rect(inputs)?);
-        let points_m = if segmenter.is_local() { 0.0 } else { halo_m };
-        let all = gather(inputs, points_m, &[Aligned::Height])?;
-        let markers = markers(inputs, &all.tile_rect.grown(halo_m), &all.cloud.frame)?;
-        context.check_cancelled()?;
-        let claims = claims(&*segmenter, params, &all, &markers)?;
+        let (all, claims) = match params.command.is_empty() {
+            true => built_in(params, inputs, context)?,
+            false => program::claims(params, inputs, context)?,
+        };
         context.advance(all.own_len as u64);
         let claims = all.own_values(&claims);
         let labelled = claims.iter().filter(|claim| claim.id != 0).count();
@@ -66,6 +83,22 @@ impl Stage for SegmentationStage {
         context.emit(&labels(&claims), facts)?;
         Ok(())
     }
+}
+
+/// The tree of every point of a tile and its surroundings, by the method that the parameters name.
+fn built_in(
+    params: &SegmentationParams,
+    inputs: &Inputs,
+    context: &Context<'_>,
+) -> Result<(Surroundings, Vec<Claim>), StageError> {
+    let segmenter = segmenter(params);
+    let halo_m = needed_m(&*segmenter, params, &tile_rect(inputs)?);
+    let points_m = if segmenter.is_local() { 0.0 } else { halo_m };
+    let all = gather(inputs, points_m, &[Aligned::Height])?;
+    let markers = markers(inputs, &all.tile_rect.grown(halo_m), &all.cloud.frame)?;
+    context.check_cancelled()?;
+    let claims = claims(&*segmenter, params, &all, &markers)?;
+    Ok((all, claims))
 }
 
 /// The tile's rectangle in the world.
