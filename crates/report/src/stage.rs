@@ -246,6 +246,10 @@ impl Layers {
         let (window, values) = gridding::highest(&cloud, &height_m, self.canopy.cell_m);
         self.canopy.raise(window, &values);
         self.add_terrain(&Grid::from(&inputs.of_tile::<GroundModel>(tile)?.raster));
+        // Where a stage failed on the way to the trees, the rest is drawn all the same.
+        if inputs.tile_path(Trees::NAME, tile).is_err() {
+            return Ok(());
+        }
         let Trees { trees } = inputs.of_tile::<Trees>(tile)?;
         for tree in trees {
             self.tallest_m = self.tallest_m.max(tree.height_m);

@@ -186,7 +186,7 @@ impl Default for SegmentationParams {
 
 impl SegmentationParams {
     /// What is wrong with the values together: a tree may not reach further than `reach_m`, which
-    /// those who fit crowns to its points rely on.
+    /// those who fit crowns to its points rely on; a command begins with a program.
     #[must_use]
     pub fn check(&self) -> Vec<String> {
         let radius = match self.method {
@@ -204,7 +204,10 @@ impl SegmentationParams {
                 self.reach_m
             )
         };
-        too_far.map(fault).into_iter().collect()
+        let nameless = self.command.first().is_some_and(|program| program.trim().is_empty());
+        let nameless =
+            nameless.then(|| "`command` begins with an empty word; name a program".to_owned());
+        too_far.map(fault).into_iter().chain(nameless).collect()
     }
 }
 

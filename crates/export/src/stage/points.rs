@@ -1,7 +1,7 @@
 //! `points.laz`.
 
 use super::Params;
-use super::survey::{Survey, put, read, rename};
+use super::survey::{Survey, has_trees, put, read, rename};
 use crate::Error;
 use crate::las::{Dimension, DimensionType, LasOptions, LasWriter, offset_for};
 use std::fs::File;
@@ -96,7 +96,11 @@ fn labelled(tile: TileId, inputs: &Inputs) -> Result<PointCloud, StageError> {
 
 fn put_results(cloud: &mut PointCloud, tile: TileId, inputs: &Inputs) -> Result<(), StageError> {
     let (_, Heights { height_m }) = read::<Heights>(inputs, tile)?;
-    let (_, Labels { tree_id, .. }) = read::<Labels>(inputs, tile)?;
+    // A point must not name a tree that is in no table.
+    let tree_id = match has_trees(inputs, tile) {
+        true => read::<Labels>(inputs, tile)?.1.tree_id,
+        false => vec![0; cloud.len()],
+    };
     for (kind, found) in [(Heights::NAME, height_m.len()), (Labels::NAME, tree_id.len())] {
         if found != cloud.len() {
             return Err(misaligned(kind, tile, cloud.len(), found).into());

@@ -64,6 +64,11 @@ impl Survey {
             context.check_cancelled()?;
             survey.add_points(*tile, params, inputs)?;
             survey.add_terrain(*tile, inputs)?;
+            if !has_trees(inputs, *tile) {
+                let message = "its trees are missing: a stage failed on it or beside it";
+                context.warn(format!("tile {tile}"), message);
+                continue;
+            }
             let (header, trees) = read::<Trees>(inputs, *tile)?;
             survey.note_stage(&header);
             survey.trees.add(&trees.trees)?;
@@ -222,6 +227,12 @@ pub(super) fn rename(cloud: &mut PointCloud, from: &str, to: &str) {
 /// Adds a column, replacing one of the same name.
 pub(super) fn put(cloud: &mut PointCloud, name: &str, column: Column) {
     cloud.extra.insert(name.to_owned(), column);
+}
+
+/// Whether a tile has its trees. Where a stage failed on the way to them, points and terrain are there
+/// all the same.
+pub(super) fn has_trees(inputs: &Inputs, tile: TileId) -> bool {
+    inputs.tile_path(Trees::NAME, tile).is_ok()
 }
 
 /// Reads an artefact of a tile with its header.
