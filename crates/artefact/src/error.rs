@@ -103,9 +103,13 @@ pub enum Error {
     Points(#[from] timberline_pointcloud::Error),
 }
 
-/// Versions in a row: `1`, `1 or 2`.
+/// Versions in a row: `1`, `1 or 2`, `1, 2 or 3`.
 fn listed(versions: &[u32]) -> String {
-    versions.iter().map(u32::to_string).collect::<Vec<_>>().join(" or ")
+    let words: Vec<String> = versions.iter().map(u32::to_string).collect();
+    match words.split_last() {
+        Some((last, first)) if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        _ => words.concat(),
+    }
 }
 
 impl Error {

@@ -288,7 +288,26 @@ fn golden_files_of_older_versions_are_migrated_or_refused_by_name() {
     read_older::<Labels>();
     read_older::<Trees>();
     read_older::<Outputs>();
-    assert_eq!(Trees::READABLE, [1, 2]);
+    assert_eq!(Trees::READABLE, [1, 2, 3]);
+    assert_eq!(Treetops::READABLE, [1, 2]);
+}
+
+/// A tree of a time when detection had no scores.
+fn undetected() -> Tree {
+    Tree { score: f32::NAN, origin: Origin::Surface, ..common::tree() }
+}
+
+#[test]
+fn trees_of_version_2_are_migrated() {
+    let (_, table) = read::<Trees>(&golden().join("trees-v2.tmbr")).unwrap();
+    assert_eq!(format!("{:?}", table.trees), format!("{:?}", [undetected()]));
+}
+
+#[test]
+fn treetops_of_version_1_are_migrated() {
+    let (_, table) = read::<Treetops>(&golden().join("treetops-v1.tmbr")).unwrap();
+    let [top] = table.tops[..] else { panic!("{table:?}") };
+    assert_eq!((top.id, top.prominence_m, top.score, top.cover_m), (42, 1.25, 1.0, 0.0));
 }
 
 /// What version 1 kept is there; what it did not keep is missing and not zero.
@@ -304,7 +323,7 @@ fn trees_of_version_1_are_migrated() {
         fit_objective_m: f64::NAN,
         fit_gap: f64::NAN,
         fit_nodes: 0,
-        ..common::tree()
+        ..undetected()
     };
     // As text, where not-a-number is equal to itself.
     assert_eq!(format!("{:?}", table.trees), format!("{:?}", [expected]));
@@ -320,7 +339,7 @@ fn a_version_that_cannot_be_read_names_those_that_can() {
     writer.write_all(b"of the future").unwrap();
     writer.finish(&header.to_json().unwrap()).unwrap();
     let error = read::<Trees>(&path).unwrap_err().to_string();
-    assert!(error.contains("`trees` version 9, this program reads version 1 or 2"), "{error}");
+    assert!(error.contains("`trees` version 9, this program reads version 1, 2 or 3"), "{error}");
 }
 
 #[test]

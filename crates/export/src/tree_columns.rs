@@ -300,6 +300,22 @@ pub const TREE_COLUMNS: &[Column] = &[
         |tree, _| Value::Integer(i64::from(tree.points)),
     ),
     column(
+        "score",
+        Kind::Real(3),
+        Unit::None,
+        "0 to 1",
+        "How sure it is that this is a tree; the pipeline's threshold is min_score of its stage detection",
+        |tree, _| Value::Real(f64::from(tree.score)),
+    ),
+    column(
+        "origin",
+        Kind::Text,
+        Unit::None,
+        "surface, below-canopy",
+        "What the tree was found by: a top of the canopy, or one below other crowns",
+        |tree, _| Value::Text(tree.origin.name().to_owned()),
+    ),
+    column(
         "flags",
         Kind::Text,
         Unit::None,

@@ -304,8 +304,11 @@ mod tests {
 
     #[test]
     fn the_halo_covers_window_prominence_and_support() {
-        let wide = Params { window_max_m: 30.0, support_points: 0, ..Params::default() };
+        let wide = Params { window_max_m: 30.0, support_points: 0, ..Params::by_window() };
         assert_eq!(wide.halo_m(), 15.0);
-        assert!(Params::default().halo_m() >= Params::default().prominence_reach_m + 3.0);
+        let window = Params::by_window();
+        assert!(window.halo_m() >= window.prominence_reach_m + 3.0);
+        let evidence = Params::default();
+        assert!(evidence.halo_m() >= crate::evidence::REACH_M + evidence.support_radius_m + 0.6);
     }
 }

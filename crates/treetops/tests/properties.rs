@@ -9,7 +9,7 @@
 
 use proptest::prelude::*;
 use timberline_pointcloud::{Frame, Point, PointCloud, frame, order};
-use timberline_treetops::{Input, Params, RankBy, Returns, Treetop, WindowKind, find};
+use timberline_treetops::{Input, Method, Params, RankBy, Returns, Treetop, WindowKind, find};
 
 /// Many equal heights and coordinates: x, y in decimetres, z in metres, return number.
 type Raw = (i32, i32, i32, u8);
@@ -46,7 +46,7 @@ fn all_params() -> impl Strategy<Value = Params> {
             min_prominence_m: 0.0,
             support_points,
             support_radius_m: 1.5,
-            ..Params::default()
+            ..Params::by_window()
         },
     )
 }
@@ -104,8 +104,11 @@ fn off_lattice(mut params: Params) -> Params {
     params
 }
 
-fn positions(tops: &[Treetop]) -> Vec<([f64; 3], f64, f64, f64)> {
-    tops.iter().map(|t| (t.world_m, t.height_m, t.window_m, t.prominence_m)).collect()
+fn positions(tops: &[Treetop]) -> Vec<([f64; 3], [u64; 5])> {
+    let bits = |t: &Treetop| {
+        [t.height_m, t.window_m, t.prominence_m, t.score, t.cover_m].map(f64::to_bits)
+    };
+    tops.iter().map(|t| (t.world_m, bits(t))).collect()
 }
 
 proptest! {
@@ -122,7 +125,8 @@ proptest! {
 
     #[test]
     fn frame_and_order_do_not_matter(raw in raw_points(200), params in all_params(), shift in -900i64..900) {
-        let params = Params { min_prominence_m: 0.5, ..params };
+        let method = if raw.len() % 2 == 0 { Method::Evidence } else { Method::Window };
+        let params = Params { method, min_score: 0.0, min_prominence_m: 0.5, ..params };
         let mut reversed = raw.clone();
         reversed.reverse();
         let (first, first_height) = cloud_of(&raw, [0, 0, 0]);
@@ -215,7 +219,9 @@ fn a_ground_mask_replaces_the_classes() {
 fn a_lone_point_above_a_crown_neither_counts_nor_hides_it() {
     let mut points = profile(&[8.0, 9.0, 10.0, 9.0, 8.0]);
     points.push((0.7, 40.0, Point::default()));
-    assert_eq!(tops_x(&points, &Params::default()), [0.6]);
+    assert_eq!(tops_x(&points, &Params::by_window()), [0.6]);
+    let any = Params { min_score: 0.0, ..Params::default() };
+    assert_eq!(tops_x(&points, &any), [0.6]);
     assert_eq!(tops_x(&points, &Params::fixed_circle(3.0)), [0.7]);
 }
 

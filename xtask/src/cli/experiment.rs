@@ -1,5 +1,6 @@
 //! `experiment`: the papers' experiments, on generated data or on a run with known stems.
 
+mod detection;
 mod f_figures;
 mod figures;
 mod real;
@@ -32,6 +33,8 @@ enum What {
     /// Trees found and points gathered by every segmenter: stands of five kinds, from thin to dense
     /// scans
     Segmentation(segmentation::Args),
+    /// The weights behind the scores of treetops and trees
+    Detection(detection::Args),
 }
 
 /// Arguments of `experiment crowns`.
@@ -94,6 +97,7 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
     match &args.what {
         What::Crowns(args) => crowns(program, args),
         What::Segmentation(args) => segmentation::run(args),
+        What::Detection(args) => detection::run(args),
     }
 }
 

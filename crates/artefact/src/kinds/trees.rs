@@ -1,13 +1,15 @@
 //! The tree table of a tile. Raise the version when the fields or their meaning change.
 //!
-//! * Version 2: the fitted surface with its centre, apex, rotation, objective and certificate; the
+//! * Version 3: the score of the detection and what the tree was found by.
+//! * Version 2 (`v2.rs`): the fitted surface with its centre, apex, rotation, objective and certificate; the
 //!   extent of the position beside its standard error; the method that made the position.
-//! * Version 1 (`v1.rs`) is read and migrated.
+//! * Version 1 (`v1.rs`). Both are read and migrated.
 
 mod v1;
+mod v2;
 
 use super::table_kind;
-use crate::kinds::{CrownShape, CrownStatus};
+use crate::kinds::{CrownShape, CrownStatus, Origin};
 use serde::{Deserialize, Serialize};
 
 /// Trees whose apex lies in the tile, sorted by id.
@@ -193,6 +195,10 @@ pub struct Tree {
     pub crown_m: Vec<[f64; 2]>,
     /// Bits of [`TreeFlag`].
     pub flags: u32,
+    /// How sure it is that this is a tree, 0 to 1; NaN where it was not told.
+    pub score: f32,
+    /// What it was found by.
+    pub origin: Origin,
 }
 
 impl Tree {
@@ -209,9 +215,10 @@ impl Tree {
             fit_objective_m: f64::NAN,
             fit_residual_m: f64::NAN,
             fit_gap: f64::NAN,
+            score: f32::NAN,
             ..Self::default()
         }
     }
 }
 
-table_kind!(Trees, "trees", 2, "the tree table of a tile", 1 => v1::Trees);
+table_kind!(Trees, "trees", 3, "the tree table of a tile", 1 => v1::Trees, 2 => v2::Trees);

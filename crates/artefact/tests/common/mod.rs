@@ -83,6 +83,8 @@ pub(crate) fn tree() -> Tree {
         crown_base_m: 12.0,
         crown_m: vec![[449.0, -101.0], [452.0, -101.0], [450.0, -98.0]],
         flags: TreeFlag::OneSided.bit(),
+        score: 0.75,
+        origin: Origin::BelowCanopy,
         ..Tree::default()
     }
 }

@@ -6,7 +6,7 @@ use crate::params::CrownFitParams;
 use crate::{Error, base, edge, footprint};
 use rayon::prelude::*;
 use timberline_artefact::kinds::{
-    CrownModel, CrownStatus, Detections, PositionMethod, Tree, TreeFlag, Trees,
+    CrownStatus, Detection, Detections, PositionMethod, Tree, TreeFlag, Trees,
 };
 use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
@@ -38,7 +38,7 @@ impl Stage for CrownFitStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "crown-fit",
-            version: 2,
+            version: 3,
             summary: "Position by an L1 paraboloid (Polewski et al.) or another method, outline and table of every tree",
             unit: UnitKind::Tile,
             inputs: FIT_INPUTS,
@@ -57,17 +57,16 @@ impl Stage for CrownFitStage {
     ) -> Result<(), StageError> {
         let columns = [Aligned::Height, Aligned::Label];
         let near = gather(inputs, Self::halo_m(params), &columns)?;
-        let (_, Detections { trees }) = inputs.own()?;
-        let models: Vec<CrownModel> = trees.into_iter().map(|tree| tree.model).collect();
-        check_reach(&models, params.reach_m)?;
+        let (_, Detections { trees: found }) = inputs.own()?;
+        check_reach(&found, params.reach_m)?;
         let grid = Grid2::new(&near.cloud.x, &near.cloud.y, GRID_CELL_M)?;
-        let members = members(&near, &models);
-        let mut trees = Vec::with_capacity(models.len());
-        let work: Vec<_> = models.iter().zip(&members).collect();
+        let members = members(&near, &found);
+        let mut trees = Vec::with_capacity(found.len());
+        let work: Vec<_> = found.iter().zip(&members).collect();
         for batch in work.chunks(BATCH) {
             context.check_cancelled()?;
-            let row = |(model, points): &(&CrownModel, &Vec<u32>)| {
-                tree_of(model, points, &near, &grid, params, context)
+            let row = |(found, points): &(&Detection, &Vec<u32>)| {
+                tree_of(found, points, &near, &grid, params, context)
             };
             trees.par_extend(batch.par_iter().map(row));
         }
@@ -78,8 +77,8 @@ impl Stage for CrownFitStage {
     }
 }
 
-fn check_reach(models: &[CrownModel], reach_m: f64) -> Result<(), Error> {
-    match models.iter().find(|model| model.radius_m > reach_m) {
+fn check_reach(found: &[Detection], reach_m: f64) -> Result<(), Error> {
+    match found.iter().map(|tree| &tree.model).find(|model| model.radius_m > reach_m) {
         None => Ok(()),
         Some(far) => Err(Error::Reach { tree: far.id, radius_m: far.radius_m, reach_m }),
     }
@@ -94,11 +93,11 @@ fn facts(located: Facts, trees: &[Tree]) -> Facts {
         .count("fitted", trees.iter().filter(fitted).count())
 }
 
-/// The points labelled with each model's tree, in the order of the models.
-fn members(near: &Surroundings, models: &[CrownModel]) -> Vec<Vec<u32>> {
-    let mut members = vec![Vec::new(); models.len()];
+/// The points labelled with each tree, in the order of the trees.
+fn members(near: &Surroundings, found: &[Detection]) -> Vec<Vec<u32>> {
+    let mut members = vec![Vec::new(); found.len()];
     for (point, id) in near.tree_id.iter().enumerate().filter(|(_, id)| **id != 0) {
-        if let Ok(place) = models.binary_search_by_key(id, |model| model.id) {
+        if let Ok(place) = found.binary_search_by_key(id, |tree| tree.model.id) {
             members[place].push(point as u32);
         }
     }
@@ -106,16 +105,16 @@ fn members(near: &Surroundings, models: &[CrownModel]) -> Vec<Vec<u32>> {
 }
 
 fn tree_of(
-    model: &CrownModel,
+    found: &Detection,
     points: &[u32],
     near: &Surroundings,
     grid: &Grid2,
     params: &CrownFitParams,
     context: &Context<'_>,
 ) -> Tree {
-    let cloud = &near.cloud;
+    let (cloud, model) = (&near.cloud, &found.model);
     let apex = cloud.frame.local_from_world(model.apex_m);
-    let mut tree = Tree { points: points.len() as u32, ..blank_row(model) };
+    let mut tree = Tree { points: points.len() as u32, ..blank_row(found) };
     let mut flags = Vec::new();
     if model.status != CrownStatus::Accepted {
         flags.push(TreeFlag::ModelRejected);
@@ -135,9 +134,11 @@ fn tree_of(
     tree
 }
 
-/// A row with what the crown model says.
-fn blank_row(model: &CrownModel) -> Tree {
+/// A row with what the detection and its crown model say.
+fn blank_row(Detection { model, score, origin }: &Detection) -> Tree {
     Tree {
+        score: *score,
+        origin: *origin,
         id: model.id,
         apex_m: model.apex_m,
         ground_m: quantise(model.apex_m[2] - model.height_m),

@@ -21,6 +21,8 @@ pub struct Sample<const N: usize> {
     pub values: [f64; N],
     /// Whether it is right.
     pub is_right: bool,
+    /// How much it counts.
+    pub weight: f64,
 }
 
 /// A fitted model: probability = logistic(constant + factors * terms).
@@ -96,11 +98,12 @@ impl<const N: usize> Regression<N> {
             column.iter_mut().skip(1).zip(terms).for_each(|(entry, term)| *entry = term);
             let probability = logistic(column.dot(weights));
             let right = f64::from(u8::from(sample.is_right));
-            gradient.axpy(right - probability, &column, 1.0);
-            loss -= libm::log(
-                if sample.is_right { probability } else { 1.0 - probability }.max(1e-300),
-            );
-            column *= (probability * (1.0 - probability)).sqrt();
+            gradient.axpy(sample.weight * (right - probability), &column, 1.0);
+            loss -= sample.weight
+                * libm::log(
+                    if sample.is_right { probability } else { 1.0 - probability }.max(1e-300),
+                );
+            column *= (sample.weight * probability * (1.0 - probability)).sqrt();
         }
         let curvature = &rows * rows.transpose();
         (gradient, curvature, loss)
@@ -132,7 +135,8 @@ mod tests {
             .map(|_| {
                 let values = [stream.normal(), 3.0 + 2.0 * stream.normal()];
                 let exponent = 0.5 + values[0] - 0.7 * values[0] * (values[1] - 3.0) / 2.0;
-                Sample { values, is_right: stream.chance(logistic(exponent)) }
+                let is_right = stream.chance(logistic(exponent));
+                Sample { values, is_right, weight: 1.0 }
             })
             .collect();
         let found = Regression::fit(&samples);

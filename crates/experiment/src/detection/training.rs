@@ -2,7 +2,7 @@
 
 use super::Sample;
 use crate::Error;
-use crate::segmentation::{Case, Chain, Experiment, Plot};
+use crate::segmentation::{Case, Chain, Experiment, Plot, StandKind};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
 use timberline_treetops::evidence::LEN;
@@ -21,7 +21,7 @@ impl Default for Training {
     /// Seed 1000: experiments of other seeds share no stand with it.
     fn default() -> Self {
         Self {
-            experiment: Experiment { seed: 1000, repeats: 2, ..Experiment::default() },
+            experiment: Experiment { seed: 1000, repeats: 3, ..Experiment::default() },
             slopes_deg: vec![4.0, 25.0],
         }
     }
@@ -36,14 +36,14 @@ impl Training {
         &self,
         visit: impl Fn(&Plot) -> Result<T, Error> + Sync,
         done: &(dyn Fn() + Sync),
-    ) -> Result<Vec<T>, Error> {
+    ) -> Result<Vec<(StandKind, T)>, Error> {
         let of = |case: &Case| {
             let turn = case.repeat as usize % self.slopes_deg.len().max(1);
             let slope_deg = self.slopes_deg.get(turn).copied().unwrap_or_default();
             let experiment = Experiment { slope_deg, ..self.experiment.clone() };
             let result = visit(&Plot::generate(&experiment, case)?);
             done();
-            result
+            result.map(|value| (case.stand, value))
         };
         self.experiment.cases().par_iter().map(of).collect()
     }
@@ -63,10 +63,14 @@ pub fn treetops(
         let points: Vec<u32> = found.iter().map(|candidate| candidate.index).collect();
         let right = right(plot, &points);
         let samples = found.into_iter().zip(right).filter(|(one, _)| judged(plot, one.index));
-        let sample = |(one, is_right): (Candidate, bool)| Sample { values: one.evidence, is_right };
+        let sample = |(one, is_right): (Candidate, bool)| Sample {
+            values: one.evidence,
+            is_right,
+            weight: 1.0,
+        };
         Ok(samples.map(sample).collect::<Vec<_>>())
     };
-    Ok(training.each(of, done)?.into_iter().flatten().collect())
+    Ok(balanced(training.each(of, done)?))
 }
 
 /// The candidates that treetops and crown models leave, with what speaks for and against each.
@@ -83,10 +87,10 @@ pub fn trees(
         let right = right(plot, &points);
         let samples = points.iter().zip(candidates.evidence()).zip(right);
         let samples = samples.filter(|((point, _), _)| judged(plot, **point));
-        let sample = |((_, values), is_right)| Sample { values, is_right };
+        let sample = |((_, values), is_right)| Sample { values, is_right, weight: 1.0 };
         Ok(samples.map(sample).collect::<Vec<_>>())
     };
-    Ok(training.each(of, done)?.into_iter().flatten().collect())
+    Ok(balanced(training.each(of, done)?))
 }
 
 fn judged(plot: &Plot, point: u32) -> bool {
@@ -108,4 +112,24 @@ fn right(plot: &Plot, points: &[u32]) -> Vec<bool> {
     let mut right = vec![false; points.len()];
     best.values().for_each(|place| right[*place] = true);
     right
+}
+
+/// A kind of stand counts at most this much more than another for each of its trees.
+const LARGEST_WEIGHT: f64 = 8.0;
+
+/// All samples, such that every kind of stand counts as much as the one with the most true trees, as
+/// far as the largest weight allows: savannas have few trees, plantations many.
+fn balanced<const N: usize>(cases: Vec<(StandKind, Vec<Sample<N>>)>) -> Vec<Sample<N>> {
+    let mut right: BTreeMap<StandKind, f64> = BTreeMap::new();
+    for (kind, samples) in &cases {
+        *right.entry(*kind).or_default() += samples.iter().filter(|s| s.is_right).count() as f64;
+    }
+    let most = right.values().copied().fold(1.0, f64::max);
+    let weight =
+        |kind| (most / right.get(&kind).copied().unwrap_or(1.0).max(1.0)).min(LARGEST_WEIGHT);
+    let weighted = cases.into_iter().flat_map(|(kind, samples)| {
+        let weight = weight(kind);
+        samples.into_iter().map(move |sample| Sample { weight, ..sample })
+    });
+    weighted.collect()
 }
