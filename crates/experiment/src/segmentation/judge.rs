@@ -73,6 +73,8 @@ pub struct FoundRow {
     pub points: usize,
     /// Points of it that belong to the true tree it is; 0 if it is none.
     pub shared_points: usize,
+    /// Points of that true tree; 0 if it is none.
+    pub true_points: usize,
     /// The true tree it is, and whether that is visible.
     pub is: Option<(u64, bool)>,
     /// Whether it is a true tree when heights must agree, too.
@@ -182,6 +184,7 @@ fn found_row(
         layer,
         points: points.of_found(id).len(),
         shared_points: own.map_or(0, |own| points.shared(own.id, id)),
+        true_points: own.map_or(0, |own| points.of_true(own.id).len()),
         is: own.map(|own| (own.id, own.visible)),
         is_with_height: false,
     }

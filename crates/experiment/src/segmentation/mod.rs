@@ -1,7 +1,7 @@
 //! Segmenters compared, on stands whose every point is known.
 //!
 //! A stand is grown and scanned ([`plot`]), its trees are found by the library functions of the
-//! airborne chain ([`chain`]), every segmenter gives the points their trees ([`method`]), and trees
+//! airborne chain ([`chain`]), every segmenter gives the points their trees ([`method`](mod@method)), and trees
 //! and points are compared with the truth ([`judge`](mod@judge), [`summary`]).
 //!
 //! ```

@@ -65,7 +65,7 @@ impl Summary {
             all: group("all", &trees, &found, |_| true, |_| true),
             with_height: with_height(&trees, &found),
             visible: group("visible", &trees, &found, |tree| tree.visible, is_not_hidden),
-            segments: segments(&hits, trees.len(), found.len()),
+            segments: segments(&trees, &found),
             by_height: by_height(&trees, &found, edges_m),
             by_layer: by_layer(&trees, &found),
             top_error_m: errors(|hit| hit.top_error_m),
@@ -91,13 +91,22 @@ fn with_height(trees: &[&TrueRow], found: &[&FoundRow]) -> Accuracy {
     }
 }
 
-fn segments(hits: &[(&TrueRow, &Hit)], reference: usize, detected: usize) -> Accuracy {
-    let overlap = |(tree, hit): &(&TrueRow, &Hit)| {
-        ratio(hit.shared_points, tree.points + hit.found_points - hit.shared_points)
+fn segments(trees: &[&TrueRow], found: &[&FoundRow]) -> Accuracy {
+    let is_held = |shared: usize, one: usize, other: usize| {
+        shared > 0 && ratio(shared, one + other - shared) >= HALF
     };
-    let held = hits.iter().filter(|hit| overlap(hit) >= HALF).count();
-    let group = "segments".to_owned();
-    Accuracy { group, reference, found: held, detected: Some(detected), correct: held }
+    let of_true = |tree: &&&TrueRow| {
+        tree.hit.is_some_and(|hit| is_held(hit.shared_points, tree.points, hit.found_points))
+    };
+    let of_found =
+        |tree: &&&FoundRow| is_held(tree.shared_points, tree.points, tree.true_points);
+    Accuracy {
+        group: "segments".to_owned(),
+        reference: trees.len(),
+        found: trees.iter().filter(of_true).count(),
+        detected: Some(found.len()),
+        correct: found.iter().filter(of_found).count(),
+    }
 }
 
 fn is_not_hidden(tree: &FoundRow) -> bool {
@@ -198,6 +207,7 @@ mod tests {
             layer: Some(Layer::Upper),
             points: 80,
             shared_points,
+            true_points: 100,
             is,
             is_with_height: is.is_some(),
         }
@@ -236,6 +246,18 @@ mod tests {
         assert_eq!(summary.tree_purity, Some(0.5));
         assert_eq!(summary.tree_completeness, Some(0.4));
         assert_eq!((summary.top_error_m.n, summary.top_error_m.rmse), (2, 0.5));
+    }
+
+    #[test]
+    fn a_segment_holds_its_tree_from_half_on() {
+        let mut one = example();
+        one.trees[0].hit = Some(hit(7, 70, 80));
+        one.found[0].shared_points = 70;
+        // The partner of the third is judged elsewhere.
+        one.trees[2].hit = Some(hit(8, 100, 100));
+        let summary = Summary::of(&[&one], &[]);
+        assert_eq!((summary.segments.found, summary.segments.correct), (2, 1));
+        assert_eq!(summary.segments.precision(), Some(1.0 / 3.0));
     }
 
     #[test]
