@@ -98,8 +98,7 @@ fn segments(trees: &[&TrueRow], found: &[&FoundRow]) -> Accuracy {
     let of_true = |tree: &&&TrueRow| {
         tree.hit.is_some_and(|hit| is_held(hit.shared_points, tree.points, hit.found_points))
     };
-    let of_found =
-        |tree: &&&FoundRow| is_held(tree.shared_points, tree.points, tree.true_points);
+    let of_found = |tree: &&&FoundRow| is_held(tree.shared_points, tree.points, tree.true_points);
     Accuracy {
         group: "segments".to_owned(),
         reference: trees.len(),
