@@ -38,8 +38,10 @@ pub struct Request<'a> {
     pub is_ground: &'a [bool],
     /// Whether a point is the tile's own.
     pub own: &'a [bool],
-    /// The trees, in the frame of the points.
+    /// The trees, in the frame of the points, sorted by id.
     pub markers: &'a [Marker],
+    /// Farthest that those who read the answer expect a point from the top of its tree, in the plane, m.
+    pub reach_m: f64,
     /// The system in which the program gets its coordinates.
     pub crs: &'a Crs,
 }
@@ -75,8 +77,33 @@ pub fn segment(
     give::points(request, &program.folder.join(give::POINTS))?;
     give::tops(request, &program.folder.join(give::TOPS))?;
     run::run(program, cancelled, log)?;
-    let answer = take::take(program.folder, request)?;
+    let mut answer = take::take(program.folder, request)?;
+    let far = drop_far(request, &mut answer.tree_id);
+    if far > 0 {
+        log(format!(
+            "{far} points farther than reach_m = {} m from the top of their tree got none",
+            request.reach_m
+        ));
+    }
     Ok(claims(request, answer))
+}
+
+/// Takes their tree from points that are too far from its top; their number.
+fn drop_far(request: &Request<'_>, tree_id: &mut [u64]) -> usize {
+    let (cloud, squared_m2) = (request.cloud, request.reach_m * request.reach_m);
+    let mut far = 0;
+    for (index, id) in tree_id.iter_mut().enumerate() {
+        let Ok(at) = request.markers.binary_search_by_key(id, |marker| marker.crown.id) else {
+            continue;
+        };
+        let [x, y, _] = request.markers[at].crown.apex;
+        let (dx, dy) = (cloud.x[index] - x, cloud.y[index] - y);
+        if dx * dx + dy * dy > squared_m2 {
+            *id = 0;
+            far += 1;
+        }
+    }
+    far
 }
 
 /// What a program answered, checked.

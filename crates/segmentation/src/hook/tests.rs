@@ -51,6 +51,7 @@ impl Question {
             is_ground: &[true, false, false, false, false],
             own: &FLAGS,
             markers: &self.markers,
+            reach_m: 10.0,
             crs: &self.crs,
         }
     }
@@ -108,6 +109,14 @@ fn a_good_answer_gets_scores_by_the_surface() {
     assert_eq!(ids, [0, 71, 71, 71, 72]);
     let on_surface: Vec<bool> = claims.iter().map(|claim| claim.score > 0.5).collect();
     assert_eq!(on_surface, [false, true, true, false, true], "{claims:?}");
+}
+
+#[test]
+fn points_far_from_their_tree_get_none() {
+    let ran = csv(&GOOD.replace("4,72", "4,71").replace("0,0", "0,72"));
+    let expected = "1 points farther than reach_m = 10 m from the top of their tree got none";
+    assert!(ran.log.ends_with(expected), "{}", ran.log);
+    assert_eq!(ran.ids(), [72, 71, 71, 71, 0]);
 }
 
 #[test]

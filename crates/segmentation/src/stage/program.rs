@@ -29,6 +29,7 @@ pub(super) fn claims(
         is_ground: &all.is_ground,
         own: &own,
         markers: &markers,
+        reach_m: params.reach_m,
         crs: &crs,
     };
     let folder = context.scratch()?;
