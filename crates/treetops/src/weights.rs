@@ -16,6 +16,7 @@ pub(crate) const SCALES: [f64; 37] = [
 ];
 pub(crate) const CONSTANT: f64 = -10.33928;
 #[rustfmt::skip]
+#[allow(clippy::approx_constant, reason = "any of so many numbers may come near one")]
 pub(crate) const FACTORS: [f64; 740] = [
     0.24332, 0.88715, 0.25221, -1.30732, 0.12159, 1.66055, 1.35853, 0.47387, -0.28656, -1.3346, -0.5711, 0.14816,
     0.0129, -0.19075, -0.18061, -0.1465, -0.01014, 0.5932, -0.24265, -0.1091, -0.02354, 0.15163, 0.33992, 0.26603,

@@ -54,8 +54,10 @@ fn over_tiles(cloud: &PointCloud, grid: TileGrid, params: &Params) -> Vec<Treeto
     tops
 }
 
-/// What tells a treetop apart, its index in the tile aside.
-fn facts_of(tops: &[Treetop]) -> Vec<(u64, [f64; 3], [u64; 3], [u32; 2])> {
+/// What tells a treetop apart, its index in the tile aside, to the bit.
+type Bits = (u64, [f64; 3], [u64; 3], [u32; 2]);
+
+fn facts_of(tops: &[Treetop]) -> Vec<Bits> {
     let bits = |t: &Treetop| [t.height_m, t.window_m, t.prominence_m].map(f64::to_bits);
     let scores = |t: &Treetop| [t.score, t.cover_m].map(f32::to_bits);
     tops.iter().map(|t| (t.id, t.apex_m, bits(t), scores(t))).collect()

@@ -12,6 +12,7 @@ pub(crate) const SCALES: [f64; 13] = [
 ];
 pub(crate) const CONSTANT: f64 = 7.52481;
 #[rustfmt::skip]
+#[allow(clippy::approx_constant, reason = "any of so many numbers may come near one")]
 pub(crate) const FACTORS: [f64; 104] = [
     4.46347, -0.71658, 0.12744, 1.20672, -0.10545, -0.99913, 0.19159, -0.62404, 0.82411, 0.43133, 3.30105, -0.01308,
     0.59161, -0.00766, -0.48799, -0.63597, 0.7524, 0.1982, -0.01625, 0.2317, 0.0571, 0.06554, -0.03151, 1.41746,

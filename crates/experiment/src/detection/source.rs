@@ -27,7 +27,7 @@ pub fn source<const N: usize>(model: &Regression<N>, about: &str) -> String {
     let count = model.factors.len();
     let _ = writeln!(
         text,
-        "#[rustfmt::skip]\npub(crate) const FACTORS: [f64; {count}] = [{}];",
+        "#[rustfmt::skip]\n#[allow(clippy::approx_constant, reason = \"any of so many numbers may come near one\")]\npub(crate) const FACTORS: [f64; {count}] = [{}];",
         list(&model.factors)
     );
     text
