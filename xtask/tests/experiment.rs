@@ -77,11 +77,12 @@ fn a_run_with_known_stems() {
         let row = rows.iter().find(|row| row["method"].as_str().unwrap().starts_with(name));
         row.unwrap_or_else(|| panic!("{name}"))["errors"].clone()
     };
-    // The run's positions are those of its method, rounded to the lattice of points.
+    // The run's positions are those of its method; but the run has the prior about the apex, this about
+    // the highest of the points, which for trees below others may be another.
     let (own, l1) = (of("positions of the run"), of("L1, ω = 0, exact bounds, prior δ = 0.5 m"));
     assert_eq!(own["n"], l1["n"]);
-    assert!((own["median"].as_f64().unwrap() - l1["median"].as_f64().unwrap()).abs() < 0.01);
-    assert!(of("L2, free axes")["median"].as_f64().unwrap() < 0.6);
+    assert!((own["median"].as_f64().unwrap() - l1["median"].as_f64().unwrap()).abs() < 0.03);
+    assert!(of("L2, free axes")["median"].as_f64().unwrap() < 1.0);
 
     let out = folder.path().join("out");
     let crowns = ["experiment", "crowns", "--campaign", place, "--cells", "0.5", "--json", "--out"];

@@ -117,15 +117,19 @@ fn run_with(grid: TileGrid, threads: usize, fit: &CrownFitParams) -> Results {
     }
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
     let (mut models, mut trees, mut warnings) = (Vec::new(), Vec::new(), Vec::new());
-    for (tile, ..) in tiles {
-        let unit = UnitId::Tile(tile);
+    let units: Vec<UnitId> = tiles.iter().map(|(tile, ..)| UnitId::Tile(*tile)).collect();
+    for unit in &units {
         let params = CrownModelParams::default();
         let path =
             pool.install(|| store.run::<CrownModelStage>(unit.clone(), None, &params)).unwrap();
         models.extend(read::<CrownModels>(&path).unwrap().1.models);
         warnings.extend(read_header(&path).unwrap().warnings);
-        let unscored = DetectionParams { min_score: 0.0, ..DetectionParams::default() };
-        store.run::<DetectionStage>(unit.clone(), None, &unscored).unwrap();
+    }
+    let all = DetectionParams { min_score: 0.0, ..DetectionParams::default() };
+    for unit in &units {
+        pool.install(|| store.run::<DetectionStage>(unit.clone(), None, &all)).unwrap();
+    }
+    for unit in units {
         let path = pool.install(|| store.run::<CrownFitStage>(unit, None, fit)).unwrap();
         trees.extend(read::<Trees>(&path).unwrap().1.trees);
     }

@@ -69,7 +69,7 @@ mod tests {
         let text = String::from_utf8(bytes).unwrap();
         let expected = "7,0.000,0.000,0.000,,21.50,0.000,0.000,highest-point,,,0.00,0.00,0.00,\
                         0.00,0.00,,,,,,,0,,,,0,mixed,0.00000,0.00000,accepted,0,0,0,\
-                        centre-outside-data one-sided";
+                        ,surface,centre-outside-data one-sided";
         assert_eq!(text.lines().nth(1), Some(expected));
         assert_eq!(text.lines().count(), 2);
     }

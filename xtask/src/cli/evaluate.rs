@@ -28,7 +28,7 @@ const LAYER_RADIUS_M: f64 = 10.0;
     after_help = "Columns of a table of trees (CSV with a heading; metres; others are passed over):\n  \
     tree_id or id (else lines are counted); height_m or top_above_ground_m;\n  \
     for --position apex: top_x_m, top_y_m or x, y; for --position stem: base_x_m, base_y_m or stem_x, stem_y;\n  \
-    optional: crown_diameter_m or crown_radius_m; visible (0 leaves the tree out unless --hidden).\n\
+    optional: crown_diameter_m or crown_radius_m; visible (0 leaves the tree out with --visible).\n\
     The terrain is an ESRI ASCII raster.\n\
     With base_x_m, base_y_m or stem_x, stem_y, the crowns of the run are fitted by every method, and their distances to the stems \
     are printed side by side: as the run chose, hull centroid, highest point, L2, L1, L1 with the run's prior."
@@ -65,9 +65,10 @@ pub struct Args {
     /// Borders between classes of height, m
     #[arg(long, value_name = "M", value_delimiter = ',', default_values_t = [5.0, 10.0, 15.0, 20.0, 30.0, 40.0])]
     classes: Vec<f64>,
-    /// Count known trees that the scanner cannot see
+    /// Count only known trees over whose top nothing hangs; found ones that are hidden then count as
+    /// false
     #[arg(long)]
-    hidden: bool,
+    visible: bool,
     /// Print the report as JSON
     #[arg(long)]
     json: bool,
@@ -112,7 +113,7 @@ fn add_trees(
     dry: &DryRun<'_>,
     truth: &Path,
 ) -> Result<()> {
-    let filter = Filter { min_height_m: args.min_height, hidden: args.hidden };
+    let filter = Filter { min_height_m: args.min_height, hidden: !args.visible };
     let mut reference = read_trees(truth, args.position.columns(), filter)?;
     for (tree, layer) in
         reference.clone().iter().zip(layers(&reference, LAYER_RADIUS_M)?).enumerate()

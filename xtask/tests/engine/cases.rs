@@ -386,13 +386,16 @@ fn inspect_shows_an_older_version_as_the_present_one() {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/artefact/golden");
     let stand = ran_once();
     let shown = inspected(&stand, &golden.join("trees-v1.tmbr"));
-    for part in ["kind           trees (version 1, shown as version 2)", "position_method=\"L1\""] {
+    for part in ["kind           trees (version 1, shown as version 3)", "position_method=\"L1\""] {
         assert!(shown.contains(part), "{part} in\n{shown}");
     }
-    let shown = inspected(&stand, &golden.join("trees-v2.tmbr"));
-    for part in
-        ["kind           trees (version 2)", "rotation_deg=22.5", "fit_nodes", "semi_axes_m"]
-    {
+    let shown = inspected(&stand, &golden.join("trees-v3.tmbr"));
+    for part in [
+        "kind           trees (version 3)",
+        "rotation_deg=22.5",
+        "fit_nodes",
+        "origin=\"BelowCanopy\"",
+    ] {
         assert!(shown.contains(part), "{part} in\n{shown}");
     }
 }

@@ -113,3 +113,71 @@ fn score(evidence: &Evidence) -> f64 {
     }
     1.0 / (1.0 + libm::exp(-sum))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A round crown of 3 m radius and 6 m depth.
+    fn tree(id: u64, x: f64, z: f64, score: f64) -> Candidate {
+        Candidate {
+            id,
+            apex: [x, 0.0, z],
+            height_m: z,
+            score,
+            cover_m: 0.0,
+            coefficients: [0.5, 0.5],
+            radius_m: 3.0,
+            inliers: 120,
+            outliers: 12,
+            residual: 0.4,
+        }
+    }
+
+    fn scores(all: &[Candidate]) -> Vec<f64> {
+        Candidates::new(all.to_vec(), 10.0).unwrap().scores()
+    }
+
+    #[test]
+    fn a_bump_on_a_crown_is_less_of_a_tree_than_one_that_stands_apart() {
+        let bump = Candidate { radius_m: 0.5, inliers: 9, ..tree(2, 1.5, 18.0, 0.5) };
+        let [on, apart] = [1.5, 9.0].map(|x| {
+            let bump = Candidate { apex: [x, 0.0, 18.0], ..bump };
+            scores(&[tree(1, 0.0, 20.0, 0.95), bump])[1]
+        });
+        assert!(on < 0.5 && on < apart, "{on} on the crown, {apart} apart");
+    }
+
+    #[test]
+    fn a_crown_of_its_own_makes_a_tree() {
+        let [with, without] = [
+            tree(1, 0.0, 20.0, 0.8),
+            Candidate {
+                coefficients: [0.0; 2],
+                radius_m: 0.0,
+                inliers: 0,
+                outliers: 0,
+                residual: 0.0,
+                ..tree(1, 0.0, 20.0, 0.8)
+            },
+        ]
+        .map(|one| scores(&[one])[0]);
+        assert!(with > 0.8 && with > without, "{with} with a crown, {without} without");
+    }
+
+    #[test]
+    fn neither_order_nor_frame_nor_far_trees_matter() {
+        let all: Vec<Candidate> = (0..40)
+            .map(|i| {
+                tree(i + 1, 1.25 * i as f64, 12.0 + (i * 7 % 11) as f64, 0.3 + 0.01 * i as f64)
+            })
+            .collect();
+        let moved =
+            |one: &Candidate| Candidate { apex: [one.apex[0] + 512.0, 64.0, one.apex[2]], ..*one };
+        let mut reversed: Vec<Candidate> = all.iter().map(moved).collect();
+        reversed.reverse();
+        assert_eq!(scores(&all), scores(&reversed));
+        let near: Vec<Candidate> = all.iter().filter(|one| one.apex[0] <= 11.25).copied().collect();
+        assert_eq!(scores(&all)[0], scores(&near)[0]);
+    }
+}
