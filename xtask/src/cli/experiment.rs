@@ -168,7 +168,7 @@ fn of_campaign(program: &Program, args: &Crowns, campaign: &Path) -> Result<Name
     let truth = truth.ok_or_else(missing)?;
     let dry =
         DryRun::new(&opened.pipeline, &opened.survey, &opened.store).map_err(anyhow::Error::msg)?;
-    let filter = Filter { min_height_m: 2.0, hidden: false };
+    let filter = Filter { min_height_m: 2.0, hidden: true };
     let stems = read_trees(&truth, Position::Stem.columns(), filter)?;
     // Tops are matched with tops where the table tells them apart, as `evaluate` does.
     let reference =
