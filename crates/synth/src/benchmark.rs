@@ -28,6 +28,7 @@ pub fn stand(points: u64, seed: u64) -> SceneParams {
         area,
         terrain: terrain(edge),
         stands: stands(&area.grown(MARGIN_M)),
+        crown_relief: 0.0,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams {
             altitude_m: 900.0,

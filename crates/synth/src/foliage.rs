@@ -5,12 +5,18 @@
 //! branches of uneven length. Beams find their way by free-flight sampling with null collisions
 //! (Woodcock et al. 1965), which is exact for any density below its bound.
 
+use crate::noise::gradient_noise;
 use crate::random::{Stream, hash_cell, unit_of, whole};
 use crate::species::Foliage;
 use crate::{Crown, Tree};
 
 /// Depth under the upper surface at which a crown is as thin as around its axis, m.
 const HEART_M: f64 = 2.5;
+/// Distance of dents as a share of the crown's longer semi-axis, and the smallest, m.
+const DENT_OF_CROWN: f64 = 0.4;
+const DENT_M: f64 = 1.2;
+/// How steeply dents fall off, against gradient noise, whose values seldom leave ±0.4.
+const CONTRAST: f64 = 1.25;
 
 /// A beam or part of one: a position and a unit direction that goes down.
 #[derive(Debug, Clone, Copy)]
@@ -43,6 +49,9 @@ pub(crate) struct Optics {
     salt: u64,
     /// Cells of the clump lattice per unit of the crown's coordinates.
     clumps: [f64; 3],
+    relief_m: f64,
+    /// Dents of the envelope per unit of the crown's coordinates.
+    dents: [f64; 2],
     whorls_per_m: f64,
     stem_base: [f64; 3],
     stem_axis: [f64; 2],
@@ -63,7 +72,7 @@ pub(crate) struct Passage {
 }
 
 impl Optics {
-    pub(crate) fn new(tree: &Tree, salt: u64) -> Self {
+    pub(crate) fn new(tree: &Tree, salt: u64, crown_relief: f64) -> Self {
         let top = tree.crown.top_m;
         let per_metre = |axis: usize| (tree.base_m[axis] - top[axis]) / tree.height_m;
         let foliage = &tree.species.traits().foliage;
@@ -73,6 +82,8 @@ impl Optics {
             foliage,
             salt,
             clumps: [a, b, 1.0].map(|metres| metres / foliage.clump_m),
+            relief_m: crown_relief * foliage.relief_m,
+            dents: [a, b].map(|metres| metres / (DENT_OF_CROWN * a).max(DENT_M)),
             whorls_per_m: 1.0 / foliage.whorl_m,
             stem_base: tree.base_m,
             stem_axis: [per_metre(0), per_metre(1)],
@@ -147,13 +158,23 @@ impl Optics {
         if reach >= 1.0 || (below > 0.0 && below > crown.lower_m * (1.0 - reach * reach).sqrt()) {
             return 0.0;
         }
-        let under_surface = depth - crown.upper_m * crown.profile.depth(reach);
+        let surface = crown.upper_m * crown.profile.depth(reach);
+        let under_surface = depth - surface - self.dent_m(u, v);
         if under_surface < 0.0 {
             return 0.0;
         }
         let outside = (reach * reach).max(1.0 - under_surface * (1.0 / HEART_M));
         let between = 1.0 - (2.0 * (storey - f64::from(whorl)) - 1.0).abs();
         (foliage.inner + (1.0 - foliage.inner) * outside) * (1.0 - foliage.layering * between)
+    }
+
+    /// How far the foliage stays below the smooth envelope, m.
+    fn dent_m(&self, u: f64, v: f64) -> f64 {
+        if self.relief_m == 0.0 {
+            return 0.0;
+        }
+        let (value, _) = gradient_noise(u * self.dents[0], v * self.dents[1], self.salt);
+        self.relief_m * (0.5 + CONTRAST * value).clamp(0.0, 1.0)
     }
 
     /// Range at which a part of the beam meets the stem below the crown, if nearer than `limit`.
@@ -241,7 +262,7 @@ mod tests {
 
     #[test]
     fn hits_lie_in_the_crown_and_holes_let_beams_through() {
-        let optics = Optics::new(&tree(), 9);
+        let optics = Optics::new(&tree(), 9, 0.0);
         let mut stream = Stream::new(3, Domain::Pulse, 0);
         let (mut hits, mut through) = (0, 0);
         for i in 0..4000 {
@@ -263,7 +284,7 @@ mod tests {
 
     #[test]
     fn a_stem_is_hit_on_its_surface() {
-        let (tree, optics) = (tree(), Optics::new(&tree(), 9));
+        let (tree, optics) = (tree(), Optics::new(&tree(), 9, 0.0));
         let direction = [0.3, 0.0, -(1.0_f64 - 0.09).sqrt()];
         let mut ray = Ray { origin: [9.0, -4.0, 108.0], direction };
         ray.origin = ray.at(-200.0);

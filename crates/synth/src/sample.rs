@@ -57,6 +57,7 @@ pub fn als_stand_params() -> SceneParams {
         area,
         terrain: terrain(),
         stands: stands(),
+        crown_relief: 0.0,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams {
             altitude_m: 520.0,

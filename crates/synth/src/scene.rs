@@ -31,6 +31,10 @@ pub struct SceneParams {
     pub terrain: TerrainParams,
     /// The stands; may reach beyond the area, so that crowns hang in from outside.
     pub stands: Vec<Stand>,
+    /// How far crowns are dented between their boughs and leaders, relative to what is common in
+    /// their species; 0 leaves their envelopes smooth. The highest foliage of a dented crown may be
+    /// lower than its top, and elsewhere.
+    pub crown_relief: f64,
     /// Low vegetation.
     pub undergrowth: Undergrowth,
     /// The instrument and the flight.
@@ -95,11 +99,10 @@ impl Scene {
         let wide = area.grown(GUESS_MARGIN_M);
         let guess = GroundGuess::new(&terrain, wide.min, wide.max);
         let flight = Flight::plan(&params.scanner, &area, guess.mean_m, params.seed);
-        let optics = forest
-            .trees
-            .iter()
-            .map(|tree| Optics::new(tree, mix(params.seed ^ (u64::from(tree.id) << 20))));
-        let optics = optics.collect();
+        let optics = |tree| {
+            Optics::new(tree, mix(params.seed ^ (u64::from(tree.id) << 20)), params.crown_relief)
+        };
+        let optics = forest.trees.iter().map(optics).collect();
         let above = |tree: &crate::Tree| tree.top_above_ground_m().max(tree.height_m);
         let tallest_m = forest.trees.iter().map(above).fold(0.0, f64::max);
         Ok(Self { params, frame, terrain, forest, optics, flight, guess, tallest_m })
@@ -326,6 +329,7 @@ fn ground(params: &SceneParams) -> Result<(Frame, Terrain), Error> {
         return Err(Error::EmptyArea { min, max });
     }
     params.scanner.check()?;
+    check("crown_relief", params.crown_relief, 0.0..=3.0, "0 to 3")?;
     check("undergrowth cover", params.undergrowth.cover, 0.0..=0.7, "0 to 0.7")?;
     check("undergrowth patch_m", params.undergrowth.patch_m, 0.1..=1e4, "0.1 to 10000 m")?;
     let frame = Frame::new([params.origin_m[0], params.origin_m[1], 0]);

@@ -103,6 +103,8 @@ pub(crate) struct Foliage {
     pub(crate) clump_m: f64,
     /// How much further the envelope may reach than a branch, relative to the branch.
     pub(crate) roughness: f64,
+    /// How deep the envelope is dented between boughs and leaders where a scene has relief, m.
+    pub(crate) relief_m: f64,
     /// Vertical distance of whorls (or of storeys of boughs), m.
     pub(crate) whorl_m: f64,
     /// How far a branch drops (positive) or rises towards its tip, share of the crown radius.
@@ -120,6 +122,7 @@ const CONIFER_FOLIAGE: Foliage = Foliage {
     porosity: 0.36,
     clump_m: 0.42,
     roughness: 0.42,
+    relief_m: 0.6,
     whorl_m: 0.55,
     droop: 0.10,
     layering: 0.55,
@@ -132,6 +135,7 @@ const BROADLEAF_FOLIAGE: Foliage = Foliage {
     porosity: 0.42,
     clump_m: 0.60,
     roughness: 0.35,
+    relief_m: 1.2,
     whorl_m: 1.6,
     droop: -0.25,
     layering: 0.20,

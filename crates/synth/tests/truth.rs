@@ -20,6 +20,7 @@ fn params(stand: StandParams, edge: f64) -> SceneParams {
         area,
         terrain: TerrainParams::default(),
         stands: vec![Stand { name: "stand".into(), boundary_m, params: stand }],
+        crown_relief: 0.0,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams { true_classes: true, ..ScannerParams::default() },
     }

@@ -3,8 +3,9 @@
 use crate::candidates::Scene;
 use crate::input::Ranked;
 use crate::maxima::{CELL_TICKS, Surface, cell_ticks};
+use crate::model::MODEL;
 use crate::prominence::prominence;
-use crate::score::score;
+
 use crate::window::Window;
 use crate::{Candidate, Error, Input, Method, Params, apart};
 use rayon::prelude::*;
@@ -55,7 +56,7 @@ pub fn find(input: &Input<'_>, params: &Params) -> Result<Vec<Treetop>, Error> {
 }
 
 /// The candidates of a cloud with what there is to say about them, from which their scores follow:
-/// what the weights of the score are found on.
+/// what the model behind the score is found on.
 ///
 /// # Errors
 /// As [`find`].
@@ -66,7 +67,7 @@ pub fn candidates(input: &Input<'_>, params: &Params) -> Result<Vec<Candidate>, 
 
 fn by_evidence(ranked: &Ranked<'_>) -> Result<Vec<Treetop>, Error> {
     let scored = Scene::new(*ranked)?.candidates().into_par_iter().map(|candidate| {
-        let score = score(&candidate.evidence);
+        let score = MODEL.probability(&candidate.evidence);
         (candidate, score)
     });
     let scored = scored.filter(|(_, score)| *score >= ranked.params.min_score).collect();

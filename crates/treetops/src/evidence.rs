@@ -1,7 +1,7 @@
 //! What the points around a candidate say for and against its being the top of a tree.
 //!
 //! All of it is relative: offsets from the candidate, and numbers of points against the number of
-//! pulses that came down there, so that one set of weights serves sparse and dense scans.
+//! pulses that came down there, so that one model serves sparse and dense scans.
 
 use crate::candidates::Scene;
 

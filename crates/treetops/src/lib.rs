@@ -3,7 +3,7 @@
 //! Two methods. By **evidence** (the default): a candidate is a point with nothing just above it
 //! ([`Params::candidate_radius_m`], [`Params::candidate_gap_m`]), so trees below other crowns have
 //! candidates too; what lies around it in rings and bands of elevation ([`mod@evidence`]) gives the
-//! probability that it is the top of a tree ([`score`]), and of candidates close to one another the
+//! probability that it is the top of a tree ([`timberline_boosting`]), and of candidates close to one another the
 //! better stands.
 //!
 //! By **window**: a point is a treetop when no point of its window outranks it. Points are ranked by
@@ -41,11 +41,10 @@ mod error;
 pub mod evidence;
 mod input;
 mod maxima;
+mod model;
 mod params;
 pub mod prominence;
-pub mod score;
 pub mod stage;
-mod weights;
 mod window;
 
 pub use candidates::Candidate;

@@ -58,10 +58,10 @@ pub struct Params {
     #[schemars(extend("x-source" = "window: Tittmann et al. 2011, section 3; evidence: this program"))]
     pub method: Method,
     /// Evidence: a candidate has no point above it within this radius in the plane ...
-    #[schemars(range(min = 0.1, max = 3.0), extend("x-unit" = "m", "x-source" = "this program; the weights of the score were found with it"))]
+    #[schemars(range(min = 0.1, max = 3.0), extend("x-unit" = "m", "x-source" = "this program; the model behind the score was found with it"))]
     pub candidate_radius_m: f64,
     /// ... and within this height; what is higher hangs over it.
-    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "this program; the weights of the score were found with it"))]
+    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "this program; the model behind the score was found with it"))]
     pub candidate_gap_m: f64,
     /// Evidence: candidates less sure to be the top of a tree are left out. This keeps the work
     /// small; what is a tree is decided by `min_score` of the stage `detection`.

@@ -37,6 +37,7 @@ fn stand(params: StandParams, edge_m: f64, pulses_per_m2: f64, slope_deg: f64) -
         area,
         terrain,
         stands: vec![Stand { name: "stand".into(), boundary_m, params }],
+        crown_relief: 0.0,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams::default().with_density(pulses_per_m2),
     })

@@ -33,7 +33,7 @@ enum What {
     /// Trees found and points gathered by every segmenter: stands of five kinds, from thin to dense
     /// scans
     Segmentation(segmentation::Args),
-    /// The weights behind the scores of treetops and trees
+    /// The models behind the scores of treetops and trees
     Detection(detection::Args),
 }
 

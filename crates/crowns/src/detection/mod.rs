@@ -6,18 +6,18 @@
 //! is a branch of it, a candidate on whose own surface others lie is likely their tree. Not the
 //! width of a window decides, but what the crowns gain by standing.
 //!
-//! The values ([`evidence`]) are weighted by a logistic regression of second order, found on stands
-//! with known trees.
+//! The values ([`evidence`]) give a probability by boosted decision trees ([`timberline_boosting`])
+//! that were found on stands with known trees.
 
 mod evidence;
-mod weights;
+mod model;
 
 pub use evidence::{Evidence, LEN, evidence};
 
 use crate::Error;
+use model::MODEL;
 use rayon::prelude::*;
 use timberline_pointcloud::Grid2;
-use weights::{CONSTANT, FACTORS, MEANS, SCALES};
 
 /// A candidate with its crown model. Positions are in any one frame, metres.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -97,21 +97,8 @@ impl Candidates {
     /// The probability that each candidate is a tree, in their order.
     #[must_use]
     pub fn scores(&self) -> Vec<f64> {
-        self.evidence().iter().map(score).collect()
+        self.evidence().iter().map(|evidence| MODEL.probability(evidence)).collect()
     }
-}
-
-/// The probability of a tree by its evidence.
-fn score(evidence: &Evidence) -> f64 {
-    let standard: [f64; LEN] = std::array::from_fn(|i| (evidence[i] - MEANS[i]) / SCALES[i]);
-    let mut sum = CONSTANT;
-    let mut factors = FACTORS.iter();
-    let mut add = |term: f64| sum += term * factors.next().copied().unwrap_or_default();
-    standard.iter().for_each(|value| add(*value));
-    for (i, a) in standard.iter().enumerate() {
-        standard[i..].iter().for_each(|b| add(a * b));
-    }
-    1.0 / (1.0 + libm::exp(-sum))
 }
 
 #[cfg(test)]

@@ -79,6 +79,7 @@ fn scene_params(params: &DatasetParams, seed: u64, index: u64) -> SceneParams {
         area,
         terrain: TerrainParams::default(),
         stands: cohorts.enumerate().map(stand).collect(),
+        crown_relief: 0.0,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams {
             horizontal_noise_m: params.horizontal_noise_m,

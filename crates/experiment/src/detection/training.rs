@@ -1,28 +1,35 @@
 //! Candidates on generated stands, each known to be right or not.
 
-use super::Sample;
 use crate::Error;
 use crate::segmentation::{Case, Chain, Experiment, Plot, StandKind};
 use rayon::prelude::*;
 use std::collections::BTreeMap;
+use timberline_boosting::Sample;
 use timberline_treetops::evidence::LEN;
 use timberline_treetops::{Candidate, Input, Params, candidates};
 
-/// The stands weights are found on: those of an experiment, on several slopes.
+/// The stands models are found on: those of an experiment, on several slopes, with crowns smooth
+/// and dented.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Training {
     /// Stands, densities and repetitions.
     pub experiment: Experiment,
     /// Slopes of the ground, degrees; repetitions take them in turn.
     pub slopes_deg: Vec<f64>,
+    /// Width of the crowns, relative to that of the kind of stand; repetitions take them in turn.
+    pub crown_scales: Vec<f64>,
+    /// Relief of the crowns, relative to what is common; repetitions take them in turn.
+    pub reliefs: Vec<f64>,
 }
 
 impl Default for Training {
     /// Seed 1000: experiments of other seeds share no stand with it.
     fn default() -> Self {
         Self {
-            experiment: Experiment { seed: 1000, repeats: 3, ..Experiment::default() },
+            experiment: Experiment { seed: 1000, repeats: 6, ..Experiment::default() },
             slopes_deg: vec![4.0, 25.0],
+            crown_scales: vec![1.0, 1.0, 0.8, 1.5],
+            reliefs: vec![0.0, 1.0, 2.0],
         }
     }
 }
@@ -38,9 +45,16 @@ impl Training {
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<(StandKind, T)>, Error> {
         let of = |case: &Case| {
-            let turn = case.repeat as usize % self.slopes_deg.len().max(1);
-            let slope_deg = self.slopes_deg.get(turn).copied().unwrap_or_default();
-            let experiment = Experiment { slope_deg, ..self.experiment.clone() };
+            let turn = |values: &[f64]| {
+                let place = case.repeat as usize % values.len().max(1);
+                values.get(place).copied().unwrap_or_default()
+            };
+            let experiment = Experiment {
+                slope_deg: turn(&self.slopes_deg),
+                crown_scale: turn(&self.crown_scales),
+                crown_relief: turn(&self.reliefs),
+                ..self.experiment.clone()
+            };
             let result = visit(&Plot::generate(&experiment, case)?);
             done();
             result.map(|value| (case.stand, value))

@@ -93,6 +93,10 @@ pub struct Experiment {
     pub margin_m: f64,
     /// Slope of the ground, degrees; it is gently uneven besides. 0 makes it level.
     pub slope_deg: f64,
+    /// Width of the crowns, relative to that of the kind of stand.
+    pub crown_scale: f64,
+    /// How far crowns are dented, relative to what is common in their species; 0 leaves them smooth.
+    pub crown_relief: f64,
     /// Lower trees are not looked for, m.
     pub min_height_m: f64,
     /// When a found tree can be a true one, by crown tops.
@@ -115,6 +119,8 @@ impl Default for Experiment {
             judged_edge_m: 100.0,
             margin_m: 15.0,
             slope_deg: 6.0,
+            crown_scale: 1.0,
+            crown_relief: 0.0,
             min_height_m: 2.0,
             matching: MatchParams {
                 max_distance_m: 2.0,
@@ -184,6 +190,8 @@ impl Experiment {
         within("repeats", repeats, 1.0, f64::from(MOST_REPEATS - 1), "1 to 9999")?;
         within("judged_edge_m", self.judged_edge_m, 10.0, 2000.0, "10 to 2000 m")?;
         within("margin_m", self.margin_m, 0.0, 100.0, "0 to 100 m")?;
+        within("crown_scale", self.crown_scale, 0.3, 3.0, "0.3 to 3")?;
+        within("crown_relief", self.crown_relief, 0.0, 3.0, "0 to 3")?;
         within("slope_deg", self.slope_deg, 0.0, 45.0, "0 to 45 degrees")
     }
 }

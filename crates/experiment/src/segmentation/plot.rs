@@ -160,13 +160,15 @@ fn scene(experiment: &Experiment, case: &Case, pulses_per_m2: f64) -> Result<Sce
     let Rect { min, max } = area.grown(BEYOND_M);
     let boundary_m = vec![min, [max[0], min[1]], max, [min[0], max[1]]];
     let name = case.stand.name().to_owned();
-    let params = case.stand.params();
+    let mut params = case.stand.params();
+    params.crown_scale *= experiment.crown_scale;
     Ok(Scene::new(SceneParams {
         seed: experiment.scene_seed(case),
         origin_m: CORNER_M,
         area,
         terrain: terrain(experiment.slope_deg),
         stands: vec![Stand { name, boundary_m, params }],
+        crown_relief: experiment.crown_relief,
         undergrowth: Undergrowth::default(),
         scanner: ScannerParams::default().with_density(pulses_per_m2),
     })?)

@@ -1,22 +1,23 @@
-//! `experiment detection`: the weights behind the scores of treetops and trees.
+//! `experiment detection`: the models behind the scores of treetops and trees.
 
 use super::bar;
 use crate::cli::{DONE, Usage, out};
 use anyhow::{Context, Result};
 use std::path::PathBuf;
 use timberline_artefact::publish::write_atomic;
-use timberline_experiment::detection::{Regression, Sample, Training, source, trees, treetops};
+use timberline_boosting::{Params, Sample, fit, source};
+use timberline_experiment::detection::{Training, trees, treetops};
 use timberline_experiment::segmentation::{Chain, Experiment};
 
 /// Arguments of `experiment detection`.
 #[derive(Debug, clap::Args)]
 #[command(
-    after_help = "Candidates on generated stands, each known to be a tree or not, give the weights by logistic regression. \
-    The scores of treetops come first: build them in (crates/treetops/src/weights.rs), then find those of trees \
-    (crates/crowns/src/detection/weights.rs). The same arguments give the same bytes, whatever the number of threads."
+    after_help = "Candidates on generated stands, each known to be a tree or not, give the models behind their scores: boosted decision trees. \
+    That of treetops comes first: build it in (crates/treetops/src/model.rs), then find that of trees \
+    (crates/crowns/src/detection/model.rs). The same arguments give the same bytes, whatever the number of threads."
 )]
 pub(super) struct Args {
-    /// Whose weights
+    /// Whose score
     #[arg(value_enum)]
     of: Of,
     /// Seed of the generated stands; stands of other seeds are free for tests
@@ -75,20 +76,20 @@ pub(super) fn run(args: &Args) -> Result<u8> {
 }
 
 fn fitted<const N: usize>(samples: &[Sample<N>], args: &Args) -> String {
-    let model = Regression::fit(samples);
+    let fitted = fit(samples, &Params::default());
     let right = samples.iter().filter(|sample| sample.is_right).count();
     let of = match args.of {
         Of::Treetops => "treetops",
         Of::Trees => "trees",
     };
-    out::talk(&format!("{} candidates, {right} trees, loss {:.4}", samples.len(), model.loss));
+    out::talk(&format!("{} candidates, {right} trees, loss {:.4}", samples.len(), fitted.loss));
     let about = format!(
-        "Weights of the score of {of}, as `cargo xtask experiment detection {of} --seed {} --repeats {}\n\
+        "The model behind the score of {of}, as `cargo xtask experiment detection {of} --seed {} --repeats {}\n\
          --edge {}` finds them: {} candidates, {right} of them trees.",
         args.seed,
         args.repeats,
         args.edge,
         samples.len()
     );
-    source::source(&model, &about)
+    source::source(&fitted, &about)
 }

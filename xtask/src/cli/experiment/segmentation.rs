@@ -48,6 +48,9 @@ pub(super) struct Args {
     /// Slope of the ground, degrees
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     slope: f64,
+    /// How far crowns are dented, relative to what is common in their species; 0 leaves them smooth
+    #[arg(long, value_name = "X", default_value_t = 0.0)]
+    relief: f64,
     /// Folder of real scans with truth, of which als/neon_SJER_052 and uas_treeclips are read
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -104,6 +107,7 @@ fn experiment(args: &Args) -> Result<Experiment> {
         densities_per_m2: args.densities.clone(),
         judged_edge_m: args.edge,
         slope_deg: args.slope,
+        crown_relief: args.relief,
         ..Experiment::default()
     };
     experiment.check().map_err(|error| Usage(error.to_string()))?;
