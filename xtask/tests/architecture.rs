@@ -481,12 +481,15 @@ mod architecture {
     #[test]
     fn files_have_one_subject() {
         const MOST: usize = 600;
+        // Printed by `xtask experiment detection`.
+        const TABLES: [&str; 2] = ["treetops/src/model.rs", "crowns/src/detection/model.rs"];
         let mut faults = Vec::new();
         for name in crates() {
             for source in sources(&name) {
                 let lines = source.code.lines().count();
-                if lines > MOST {
-                    faults.push(format!("{name}/{}: {lines} lines", source.path));
+                let path = format!("{name}/{}", source.path);
+                if lines > MOST && !TABLES.contains(&path.as_str()) {
+                    faults.push(format!("{path}: {lines} lines"));
                 }
             }
         }

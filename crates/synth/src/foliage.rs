@@ -283,6 +283,21 @@ mod tests {
     }
 
     #[test]
+    fn dents_take_foliage_away_and_put_none_where_none_was() {
+        let [smooth, dented] = [0.0, 1.0].map(|relief| Optics::new(&tree(), 9, relief));
+        let (mut taken, mut kept) = (0, 0);
+        for i in 0..8000 {
+            let [u, v] = [f64::from(i % 20), f64::from(i / 20 % 20)].map(|k| 0.1 * (k - 9.5));
+            let depth = 0.5 * f64::from(i / 400);
+            let densities = [&smooth, &dented].map(|optics| optics.density(u, v, depth));
+            assert!(densities[1] == 0.0 || densities[0] > 0.0, "{u} {v} {depth}: {densities:?}");
+            taken += u32::from(densities[1] == 0.0 && densities[0] > 0.0);
+            kept += u32::from(densities[1] > 0.0);
+        }
+        assert!(taken > 20 && kept > 5 * taken, "{taken} {kept}");
+    }
+
+    #[test]
     fn a_stem_is_hit_on_its_surface() {
         let (tree, optics) = (tree(), Optics::new(&tree(), 9, 0.0));
         let direction = [0.3, 0.0, -(1.0_f64 - 0.09).sqrt()];

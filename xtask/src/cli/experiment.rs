@@ -1,10 +1,10 @@
 //! `experiment`: the papers' experiments, on generated data or on a run with known stems.
 
 mod detection;
-mod f_figures;
 mod figures;
 mod real;
 mod segmentation;
+mod segmentation_figures;
 
 use super::known::{Filter, Position, as_tree, clusters, read_trees, stems_of_found, trees_of_run};
 use super::open::{Opened, Place};

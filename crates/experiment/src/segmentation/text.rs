@@ -217,13 +217,14 @@ fn introduction(experiment: &Experiment) -> String {
     let difference = matching
         .max_height_difference_m
         .map_or_else(String::new, |limit| format!(" and {limit} m in height"));
+    let crowns = crowns(experiment);
     let segmenters: Vec<String> = methods()
         .iter()
         .map(|method| format!("* `{}`: {}.\n", method.name, method.about))
         .collect();
     format!(
         "Seed {}, {} repetition(s): squares of {} m, in stands that reach {} m further on ground of {} \
-         degrees. A tree counts from {} m of height on, whether it can be seen from above or not. A \
+         degrees{crowns}. A tree counts from {} m of height on, whether it can be seen from above or not. A \
          found tree is a true one when their crown tops are not more than {} m apart in the \
          plane{difference}; {rule}. *Heights alike*: they must \
          not differ by more than {} m, either. *Visible trees*: nothing hangs over their tops; found trees \
@@ -240,6 +241,18 @@ fn introduction(experiment: &Experiment) -> String {
         experiment.layer_radius_m,
         segmenters.concat()
     )
+}
+
+/// What is unusual about the crowns.
+fn crowns(experiment: &Experiment) -> String {
+    let mut text = String::new();
+    if experiment.crown_scale != 1.0 {
+        text += &format!(", crowns {} times as wide", experiment.crown_scale);
+    }
+    if experiment.crown_relief > 0.0 {
+        text += &format!(", crowns dented {} times as is common", experiment.crown_relief);
+    }
+    text
 }
 
 fn head(pooled: &Pooled) -> Vec<String> {

@@ -1,6 +1,6 @@
 //! `experiment segmentation`: all segmenters on generated stands.
 
-use super::{bar, f_figures, real};
+use super::{bar, real, segmentation_figures};
 use crate::cli::{DONE, Usage, out};
 use anyhow::{Context, Result};
 use std::path::{Path, PathBuf};
@@ -45,12 +45,15 @@ pub(super) struct Args {
     /// Edge of the square in which trees are judged, m
     #[arg(long, value_name = "M", default_value_t = 100.0)]
     edge: f64,
+    /// Width of the crowns, relative to that of the kind of stand
+    #[arg(long, value_name = "X", default_value_t = 1.0)]
+    crown_scale: f64,
     /// Slope of the ground, degrees
     #[arg(long, value_name = "DEG", default_value_t = 6.0)]
     slope: f64,
     /// How far crowns are dented, relative to what is common in their species; 0 leaves them smooth
     #[arg(long, value_name = "X", default_value_t = 0.0)]
-    relief: f64,
+    crown_relief: f64,
     /// Folder of real scans with truth, of which als/neon_SJER_052 and uas_treeclips are read
     #[arg(long, value_name = "DIR")]
     data: Option<PathBuf>,
@@ -107,7 +110,8 @@ fn experiment(args: &Args) -> Result<Experiment> {
         densities_per_m2: args.densities.clone(),
         judged_edge_m: args.edge,
         slope_deg: args.slope,
-        crown_relief: args.relief,
+        crown_scale: args.crown_scale,
+        crown_relief: args.crown_relief,
         ..Experiment::default()
     };
     experiment.check().map_err(|error| Usage(error.to_string()))?;
@@ -180,9 +184,9 @@ impl Found {
         }
         let (experiment, trees) = (&self.experiment, text::tree_sets(&self.pooled));
         let charts = [
-            ("density", f_figures::density(experiment, &trees)),
-            ("segments", f_figures::segments(experiment, &self.pooled)),
-            ("layers", f_figures::layers(experiment, &trees)),
+            ("density", segmentation_figures::density(experiment, &trees)),
+            ("segments", segmentation_figures::segments(experiment, &self.pooled)),
+            ("layers", segmentation_figures::layers(experiment, &trees)),
         ];
         for (name, chart) in charts {
             chart.write_png(&folder.join(format!("{name}.png")))?;
