@@ -190,6 +190,17 @@ mod tests {
     }
 
     #[test]
+    fn tops_above_all_points_have_their_cones_as_well() {
+        let (piece, tops) = cones();
+        let params = NcutParams::of(&SegmentationParams::default());
+        let raised = tops.map(|top| Top { height_m: top.height_m + 1.2, ..top });
+        assert_eq!(
+            parts(&piece.view(), &raised, true, &params),
+            parts(&piece.view(), &tops, true, &params)
+        );
+    }
+
+    #[test]
     fn the_threshold_decides_where_no_tree_is_given() {
         let (piece, tops) = cones();
         let number = |most_ncut: f64| {

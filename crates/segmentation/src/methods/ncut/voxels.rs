@@ -16,6 +16,9 @@ pub(super) struct Voxels {
     stacks: Vec<Range<u32>>,
 }
 
+/// How far a top may lie above the points of its crown, m: a scan seldom meets the very top.
+const ABOVE_POINTS_M: f64 = 3.0;
+
 /// Voxels further apart than this, in columns and rows, and how alike those nearer are for it.
 type Kernel = Vec<([i64; 2], f64)>;
 
@@ -52,10 +55,14 @@ impl Voxels {
         self.cells.push(cell);
     }
 
-    /// The voxel that holds a top, if there is one.
+    /// The voxel that holds a top or, for one that is no point, the next below it, if there is one.
     pub(super) fn at(&self, view: &View<'_>, top: &Top, params: &NcutParams) -> Option<u32> {
-        let cell = cell(view, top.at, top.height_m, params);
-        self.cells.binary_search(&cell).ok().map(|place| place as u32)
+        let wanted = cell(view, top.at, top.height_m, params);
+        let above = self.cells.partition_point(|cell| *cell <= wanted);
+        let place = above.checked_sub(1)?;
+        let found = self.cells[place];
+        let gap_m = (wanted[2] - found[2]) as f64 * params.voxel_height_m;
+        (found[..2] == wanted[..2] && gap_m <= ABOVE_POINTS_M).then_some(place as u32)
     }
 
     /// Centre of every voxel in the plane, in the frame of the view.
