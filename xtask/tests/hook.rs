@@ -92,12 +92,12 @@ const AFTERWARDS: [&str; 4] = ["crown-fit", "export", "map", "segmentation"];
 
 #[test]
 fn a_program_that_fails_on_a_tile_costs_that_tile() {
-    let stand = Stand::new("[\"/bin/sh\", \"program.sh\"]");
+    let stand = Stand::new("[\"/bin/sh\", \"program.sh\"]\ncommand_time_limit_s = 5");
     stand.write("program.sh", PROGRAM);
     let (code, units) = stand.run();
     assert_eq!(code, 0, "{units:#?}");
     let done = of(&units, "segmentation", Outcome::Done);
-    assert!(done.len() >= 4, "{}", done.len());
+    assert!(done.len() > WRONGS.len(), "{}", done.len());
     for unit in &done {
         assert!(unit.log[0].contains(&format!("working on {}", unit.unit)), "{:?}", unit.log);
     }
@@ -126,6 +126,41 @@ fn a_program_that_fails_on_a_tile_costs_that_tile() {
     let (code, units) = stand.run();
     let again = of(&units, "segmentation", Outcome::Done).len();
     assert_eq!((code, again), (0, 0), "the first answers are still there");
+
+    let tiles: Vec<&str> = done.iter().map(|unit| unit.unit.as_str()).collect();
+    each_way_to_fail_costs_its_tile(&stand, &tiles);
+}
+
+/// What a program may do wrong, and what is said about it.
+const WRONGS: [(&str, &str); 4] = [
+    ("kill -9 $$", "program.sh` failed with signal: 9"),
+    ("exec sleep 600", "was killed after 5 s; raise `command_time_limit_s`"),
+    ("printf 'point,tree_id\n0,0\n' > \"$6.csv\"; exit 0", "out.csv has 1 rows, in.laz has"),
+    (
+        "points=$(od -An -tu8 -j247 -N8 \"$2\")
+         awk -v n=\"$points\" \\
+             'BEGIN { print \"point,tree_id\"; for (i = 0; i < n; i++) print i \",7\" }' > \"$6.csv\"
+         exit 0",
+        "out.csv, line 2: tree id 7",
+    ),
+];
+
+fn each_way_to_fail_costs_its_tile(stand: &Stand, tiles: &[&str]) {
+    let bad = tiles.iter().zip(WRONGS);
+    let cases = bad.clone().map(|(tile, (wrong, _))| format!("{tile}) {wrong};;\n"));
+    let script = format!("case $TIMBERLINE_UNIT in\n{}esac\n{PROGRAM}", cases.collect::<String>());
+    stand.write("program.sh", &script);
+    let (code, units) = stand.run();
+    assert_eq!(code, 3);
+    let failed = of(&units, "segmentation", Outcome::Failed);
+    assert_eq!(failed.len(), WRONGS.len());
+    for (tile, (_, expected)) in bad {
+        let unit = failed.iter().find(|unit| unit.unit == *tile).unwrap();
+        let error = unit.error.as_deref().unwrap();
+        assert!(error.contains(expected), "{error}");
+    }
+    let done = of(&units, "segmentation", Outcome::Done);
+    assert_eq!(done.len(), tiles.len() - WRONGS.len(), "the others have their answers");
 }
 
 #[test]
