@@ -15,17 +15,21 @@ pub enum UnitKind {
     File,
     /// One tile of the campaign's grid.
     Tile,
+    /// One tree, named by a campaign stage in [`Facts::trees`].
+    Tree,
     /// The whole campaign.
     Campaign,
 }
 
-/// One unit. Written `file:NAME`, `tile:COLUMN_ROW` or `campaign`.
+/// One unit. Written `file:NAME`, `tile:COLUMN_ROW`, `tree:ID` or `campaign`.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum UnitId {
     /// A raw file, by its path relative to the campaign.
     File(String),
     /// A tile.
     Tile(TileId),
+    /// A tree, by its id.
+    Tree(u64),
     /// The campaign.
     Campaign,
 }
@@ -35,6 +39,12 @@ impl UnitId {
     #[must_use]
     pub fn tile(&self) -> Option<TileId> {
         if let Self::Tile(tile) = self { Some(*tile) } else { None }
+    }
+
+    /// The tree's id, if this is one.
+    #[must_use]
+    pub fn tree(&self) -> Option<u64> {
+        if let Self::Tree(tree) = self { Some(*tree) } else { None }
     }
 
     /// A name fit for a file: a tile as `12_-7`, a raw file by its stem and a hash of its path.
@@ -51,6 +61,7 @@ impl UnitId {
                 format!("{plain}-{}", &blake3::hash(name.as_bytes()).to_hex()[..8])
             }
             Self::Tile(tile) => tile.to_string(),
+            Self::Tree(tree) => tree.to_string(),
             Self::Campaign => "campaign".to_owned(),
         }
     }
@@ -61,6 +72,7 @@ impl fmt::Display for UnitId {
         match self {
             Self::File(name) => write!(f, "file:{name}"),
             Self::Tile(tile) => write!(f, "tile:{tile}"),
+            Self::Tree(tree) => write!(f, "tree:{tree}"),
             Self::Campaign => write!(f, "campaign"),
         }
     }
@@ -72,10 +84,13 @@ impl FromStr for UnitId {
         match text.split_once(':') {
             Some(("file", name)) => Ok(Self::File(name.to_owned())),
             Some(("tile", tile)) => tile.parse().map(Self::Tile),
-            None if text == "campaign" => Ok(Self::Campaign),
-            _ => {
-                Err(format!("`{text}` is no unit; expected file:NAME, tile:COLUMN_ROW or campaign"))
+            Some(("tree", tree)) => {
+                tree.parse().map(Self::Tree).map_err(|_| format!("`{tree}` is no tree id"))
             }
+            None if text == "campaign" => Ok(Self::Campaign),
+            _ => Err(format!(
+                "`{text}` is no unit; expected file:NAME, tile:COLUMN_ROW, tree:ID or campaign"
+            )),
         }
     }
 }
@@ -127,13 +142,27 @@ pub struct Facts {
     pub counts: BTreeMap<String, u64>,
     /// The tiles for which a file's shards hold points, sorted.
     pub parts: Vec<TileId>,
+    /// The trees a campaign stage found, sorted by id: the units of stages that work on trees.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub trees: Vec<TreeUnit>,
+}
+
+/// A tree as a unit of work.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct TreeUnit {
+    /// Its id.
+    pub tree_id: u64,
+    /// Number of its points, as far as known.
+    pub points: u64,
+    /// World bounds of its points, m.
+    pub bounds: Bounds3,
 }
 
 impl Facts {
     /// Facts of a result that lies in the same place as another: its CRS, frame, bounds and grid.
     #[must_use]
     pub fn located_like(other: &Self) -> Self {
-        Self { counts: BTreeMap::new(), parts: Vec::new(), ..other.clone() }
+        Self { counts: BTreeMap::new(), parts: Vec::new(), trees: Vec::new(), ..other.clone() }
     }
 
     /// Adds a count.
@@ -188,10 +217,11 @@ mod tests {
 
     #[test]
     fn units_read_back() {
-        for text in ["file:a/b.laz", "tile:3_-4", "campaign"] {
+        for text in ["file:a/b.laz", "tile:3_-4", "tree:6307", "campaign"] {
             assert_eq!(text.parse::<UnitId>().unwrap().to_string(), text);
         }
         assert!("tile:x".parse::<UnitId>().is_err());
+        assert!("tree:-1".parse::<UnitId>().is_err());
     }
 
     #[test]

@@ -28,7 +28,7 @@ pub use crs::Crs;
 pub use error::Error;
 pub use folder::OutputFolder;
 pub use gather::{Aligned, Surroundings, gather};
-pub use header::{Facts, Header, InputRef, UnitId, UnitKind, Warning};
+pub use header::{Facts, Header, InputRef, TreeUnit, UnitId, UnitKind, Warning};
 pub use kinds::Kind;
 pub use open::{Opened, read, read_header};
 pub use raster::Raster;

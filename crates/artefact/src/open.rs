@@ -52,6 +52,19 @@ impl Opened {
         }
     }
 
+    /// The MCAP file, where points must be in one.
+    ///
+    /// # Errors
+    /// [`Error::Corrupt`].
+    pub fn mcap(&self, path: &Path) -> Result<&McapReader, Error> {
+        match self {
+            Self::Mcap(reader) => Ok(reader),
+            Self::Container(_) => {
+                Err(Error::corrupt(path, "payload", "points outside an MCAP file"))
+            }
+        }
+    }
+
     /// Checks every byte of the file (an MCAP was checked when it was opened).
     ///
     /// # Errors

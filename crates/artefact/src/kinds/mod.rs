@@ -6,6 +6,7 @@
 //! of its own, as in [`trees`], that turns into the present one; named in `table_kind!`, its version
 //! stays readable. A version that is not named there is refused by name.
 
+pub mod consolidated;
 pub mod crown_models;
 pub mod detections;
 pub mod ground_model;
@@ -14,17 +15,24 @@ pub mod heights;
 pub mod labels;
 pub mod outputs;
 pub mod points;
+pub mod qsm;
 pub mod shards;
+pub mod skeletons;
+pub mod stems;
+pub mod tree_cloud;
+pub mod tree_files;
 pub mod trees;
 pub mod treetops;
 
 use crate::container::ContainerWriter;
+use crate::mcap_file::McapReader;
 use crate::{Error, Header, Opened, codec};
 use serde::{Serialize, de::DeserializeOwned};
 use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 
+pub use consolidated::{Consolidated, Consolidation};
 pub use crown_models::{CrownModel, CrownModels, CrownShape, CrownStatus};
 pub use detections::{Detection, Detections, Origin};
 pub use ground_model::{GroundModel, HardyPatch};
@@ -33,7 +41,15 @@ pub use heights::Heights;
 pub use labels::Labels;
 pub use outputs::{OutputFile, Outputs};
 pub use points::PointTile;
+pub use qsm::{
+    ConsolidationEffect, Dbh, Distances, Qsm, QsmBranch, QsmCylinder, RadiusSource, TaperStep,
+    TreeMetrics,
+};
 pub use shards::Shards;
+pub use skeletons::{Skeleton, SkeletonNode, Skeletons};
+pub use stems::{BaseSource, Stem, Stems, VoxelRun};
+pub use tree_cloud::TreeCloud;
+pub use tree_files::{ModelFiles, PictureFiles, TreeFile};
 pub use trees::{PositionMethod, Tree, TreeFlag, Trees};
 pub use treetops::{Treetop, Treetops};
 
@@ -79,6 +95,21 @@ fn encode_table<T: Serialize>(
     let mut writer = ContainerWriter::new(BufWriter::new(out)).map_err(io)?;
     writer.write_all(&payload).map_err(io)?;
     writer.finish(&header.to_json()?).map(drop).map_err(io)
+}
+
+/// A metadata record of an MCAP artefact.
+fn record_json<T: Serialize>(kind: &'static str, value: &T) -> Result<String, Error> {
+    serde_json::to_string(value).map_err(|e| Error::Encode { kind, detail: e.to_string() })
+}
+
+/// Reads what [`record_json`] wrote.
+fn read_record<T: DeserializeOwned>(
+    path: &Path,
+    reader: &McapReader,
+    name: &str,
+) -> Result<T, Error> {
+    serde_json::from_str(&reader.record(name)?)
+        .map_err(|error| Error::corrupt(path, name, error.to_string()))
 }
 
 /// Reads a table.
@@ -161,6 +192,13 @@ pub fn all() -> Vec<KindInfo> {
         row::<Detections>(),
         row::<Labels>(),
         row::<Trees>(),
+        row::<Stems>(),
+        row::<TreeCloud>(),
+        row::<Consolidated>(),
+        row::<Skeletons>(),
+        row::<Qsm>(),
+        row::<ModelFiles>(),
+        row::<PictureFiles>(),
         row::<Outputs>(),
     ]
 }

@@ -2,7 +2,7 @@
 //! square of [`RUN_M`]. Raise the version when the fields, their meaning or the squares change.
 
 use super::Kind;
-use crate::mcap_file::McapWriter;
+use crate::mcap_file::{McapReader, McapWriter};
 use crate::{Error, Header, Opened};
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{PackedElementField, PointCloud as PointCloudMessage, Pose};
@@ -63,9 +63,7 @@ impl PointTile {
     pub fn read_within(path: &Path, rect: &Rect) -> Result<Part, Error> {
         let opened = Opened::open(path)?;
         crate::open::check_kind::<Self>(path, opened.header())?;
-        let Opened::Mcap(reader) = &opened else {
-            return Err(Error::corrupt(path, "payload", "points outside an MCAP file"));
-        };
+        let reader = opened.mcap(path)?;
         let wanted = |run: &Run| {
             let [x, y] = run.corner_m;
             Rect { min: [x, y], max: [x + RUN_M, y + RUN_M] }.touches(rect)
@@ -83,32 +81,43 @@ impl Kind for PointTile {
     const SUMMARY: &'static str = "the points of a tile, to be opened in any MCAP viewer";
 
     fn encode(&self, header: &Header, out: &mut File) -> Result<(), Error> {
-        self.cloud.validate()?;
-        let layout = Layout::of(&self.cloud);
-        let runs = runs(&self.cloud);
-        let mut writer = McapWriter::new(BufWriter::new(out))?;
-        let channel = writer.channel::<PointCloudMessage>(TOPIC)?;
-        for run in &runs {
-            let range = run.start as usize..(run.start + run.len) as usize;
-            writer
-                .message(channel, &layout.message(&self.cloud, range, &header.unit.to_string()))?;
-        }
-        let json = |value: Result<String, serde_json::Error>| {
-            value.map_err(|e| Error::Encode { kind: Self::NAME, detail: e.to_string() })
-        };
-        let records = [(RUNS_RECORD, json(serde_json::to_string(&runs))?)];
-        let out = writer.finish(header, &records)?;
-        out.into_inner()
-            .map(drop)
-            .map_err(|e| Error::Encode { kind: Self::NAME, detail: e.to_string() })
+        encode_cloud(Self::NAME, &self.cloud, header, &[], out)
     }
 
     fn decode(path: &Path, opened: &mut Opened) -> Result<Self, Error> {
-        let Opened::Mcap(reader) = opened else {
-            return Err(Error::corrupt(path, "payload", "points outside an MCAP file"));
-        };
+        let reader = opened.mcap(path)?;
         read_runs(path, reader, |_| true).map(|part| Self { cloud: part.cloud })
     }
+}
+
+/// Writes points in canonical order as an MCAP file, with further metadata records.
+pub(super) fn encode_cloud(
+    kind: &'static str,
+    cloud: &PointCloud,
+    header: &Header,
+    records: &[(&str, String)],
+    out: &mut File,
+) -> Result<(), Error> {
+    cloud.validate()?;
+    let layout = Layout::of(cloud);
+    let runs = runs(cloud);
+    let mut writer = McapWriter::new(BufWriter::new(out))?;
+    let channel = writer.channel::<PointCloudMessage>(TOPIC)?;
+    for run in &runs {
+        let range = run.start as usize..(run.start + run.len) as usize;
+        writer.message(channel, &layout.message(cloud, range, &header.unit.to_string()))?;
+    }
+    let fail = |detail: String| Error::Encode { kind, detail };
+    let runs = serde_json::to_string(&runs).map_err(|error| fail(error.to_string()))?;
+    let mut all = vec![(RUNS_RECORD, runs)];
+    all.extend(records.iter().cloned());
+    let out = writer.finish(header, &all)?;
+    out.into_inner().map(drop).map_err(|error| fail(error.to_string()))
+}
+
+/// Reads all points that [`encode_cloud`] wrote.
+pub(super) fn decode_cloud(path: &Path, reader: &McapReader) -> Result<PointCloud, Error> {
+    read_runs(path, reader, |_| true).map(|part| part.cloud)
 }
 
 /// Splits points in canonical order into the runs of their squares.
@@ -134,7 +143,7 @@ fn runs(cloud: &PointCloud) -> Vec<Run> {
 
 fn read_runs(
     path: &Path,
-    reader: &crate::mcap_file::McapReader,
+    reader: &McapReader,
     wanted: impl Fn(&Run) -> bool,
 ) -> Result<Part, Error> {
     let runs: Vec<Run> = serde_json::from_str(&reader.record(RUNS_RECORD)?)
