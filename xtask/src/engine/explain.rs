@@ -162,8 +162,7 @@ impl<'a> DryRun<'a> {
     pub fn units_known_after(&self, position: usize) -> Option<&'static str> {
         let info = |at: usize| self.pipeline.stages[at].stage.info();
         let will_run = |at: &usize| {
-            info(*at).unit != UnitKind::Tree
-                && self.stages[*at].iter().any(|plan| !plan.is_whole())
+            info(*at).unit != UnitKind::Tree && self.stages[*at].iter().any(|plan| !plan.is_whole())
         };
         let asks = info(position).unit == UnitKind::Tree;
         (0..position).rev().find(will_run).filter(|_| asks).map(|at| info(at).name)

@@ -159,8 +159,17 @@ impl<'a> Planner<'a> {
         let halo_m = stage.stage.halo_m(&stage.params);
         let by_tile = BTreeMap::new();
         let named = stage.files.iter().map(|(name, path)| Named::look(name, path)).collect();
-        let mut planner =
-            Self { pipeline, position, survey, store, before, halo_m, named, by_tile, trees: trees(before) };
+        let mut planner = Self {
+            pipeline,
+            position,
+            survey,
+            store,
+            before,
+            halo_m,
+            named,
+            by_tile,
+            trees: trees(before),
+        };
         let froms: BTreeSet<usize> = planner.inputs().map(|(_, from)| from).collect();
         for from in froms {
             if planner.kind_of(from) != UnitKind::File {
