@@ -11,6 +11,10 @@ const MEMORY: usize = 5;
 const STEEPEST: f64 = 1.0;
 /// Least sum of the weights of a stem's discs: two full circles.
 const LEAST_WEIGHT: f64 = 2.0;
+/// Highest first cross-section of a stem above ground, m: what begins higher hangs on another tree.
+const HIGHEST_FOOT_M: f64 = 2.2;
+/// Longest gap between the pieces of one stem, m: hidden behind a crown or another stem.
+const LONGEST_JOINT_M: f64 = 3.0;
 /// Blobs alone are a stem only where they are in most slices of this many.
 const BLOBS_ALONE: usize = 12;
 
@@ -71,9 +75,21 @@ impl StemAxis {
     }
 }
 
-/// Stems among cross-sections, the surest first. Every disc serves one stem at most.
+/// Stems among cross-sections, the surest first: those that come down to the ground, or, where none
+/// does, the surest one. Every disc serves one stem at most.
 #[must_use]
 pub fn stems(discs: &[Disc], params: &StemsParams) -> Vec<StemAxis> {
+    let found = without_doubles(joined(pieces(discs, params)));
+    let foot_m = |axis: &StemAxis| {
+        axis.discs.first().map_or(0.0, |disc| slices::middle_m(disc.slice, params))
+    };
+    let (down, up): (Vec<_>, Vec<_>) =
+        found.into_iter().partition(|axis| foot_m(axis) <= HIGHEST_FOOT_M);
+    if down.is_empty() { up.into_iter().take(1).collect() } else { down }
+}
+
+/// Chains of cross-sections that may be stems, the surest first.
+fn pieces(discs: &[Disc], params: &StemsParams) -> Vec<StemAxis> {
     let by_slice = BySlice::new(discs);
     let mut seeds: Vec<usize> = (0..discs.len()).collect();
     let rank = |disc: &Disc| (disc.weight() * disc.points.min(100) as f64, disc.centre_m);
@@ -95,7 +111,41 @@ pub fn stems(discs: &[Disc], params: &StemsParams) -> Vec<StemAxis> {
         }
     }
     found.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
-    without_doubles(found)
+    found
+}
+
+/// Joins pieces of one stem: one above the other, on one line, of like radii.
+fn joined(mut pieces: Vec<StemAxis>) -> Vec<StemAxis> {
+    pieces.sort_by(|a, b| a.span_m()[0].total_cmp(&b.span_m()[0]));
+    let mut whole: Vec<StemAxis> = Vec::new();
+    for piece in pieces {
+        let misfit = |below: &StemAxis| misfit(below, &piece);
+        let fits = (0..whole.len()).filter_map(|at| misfit(&whole[at]).map(|off| (off, at)));
+        match fits.min_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1))) {
+            Some((_, at)) => whole[at].discs.extend(piece.discs),
+            None => whole.push(piece),
+        }
+    }
+    whole.sort_by(|a, b| b.weight().total_cmp(&a.weight()));
+    whole
+}
+
+/// How far the line of a stem passes from a piece above it, in parts of what is allowed; none if
+/// the piece is not its continuation.
+fn misfit(below: &StemAxis, above: &StemAxis) -> Option<f64> {
+    let ([_, top], [foot, _]) = (below.span_m(), above.span_m());
+    let gap_m = foot - top;
+    let near: Vec<Disc> = above.discs.iter().take(2 * MEMORY).copied().collect();
+    let (up, down) = (below.at_elevation(foot), line(&near).at(top));
+    let off_m = |a: [f64; 2], b: [f64; 3]| {
+        ((a[0] - b[0]) * (a[0] - b[0]) + (a[1] - b[1]) * (a[1] - b[1])).sqrt()
+    };
+    let (first, last) = (above.discs.first()?.centre_m, below.discs.last()?.centre_m);
+    let off_m = off_m(up, first).min(off_m(down, last));
+    let room_m = 0.08 + 0.1 * gap_m.max(0.0) + 0.5 * below.radius_m();
+    let alike = (0.5..=1.4).contains(&(above.radius_m() / below.radius_m()));
+    let follows = (-0.3..=LONGEST_JOINT_M).contains(&gap_m);
+    (follows && alike && off_m <= room_m).then_some(off_m / room_m)
 }
 
 /// Discs by the slice they lie in.
@@ -213,7 +263,7 @@ fn is_stem(axis: &StemAxis, params: &StemsParams) -> bool {
     let circles = axis.discs.iter().filter(|disc| disc.shape == Shape::Circle).count();
     let slope = line(&axis.discs).slope;
     let enough = match circles {
-        0 | 1 => axis.discs.len() >= BLOBS_ALONE,
+        0..3 => axis.discs.len() >= BLOBS_ALONE,
         _ => axis.weight() >= LEAST_WEIGHT,
     };
     enough
@@ -266,6 +316,27 @@ mod tests {
         assert_eq!(found[0].discs.len(), 17);
         let [x, _] = found[0].at_elevation(0.5);
         assert!(x.abs() < 0.02, "{x}");
+    }
+
+    #[test]
+    fn what_begins_in_a_crown_is_a_stem_only_where_there_is_no_other() {
+        let column = |x: f64, from: u32, to: u32| {
+            (from..to).map(move |slice| disc(slice, x, 0.0, 0.1, Shape::Circle))
+        };
+        let mut both: Vec<Disc> = column(0.0, 0, 20).chain(column(3.0, 14, 26)).collect();
+        both.sort_by_key(|disc| disc.slice);
+        assert_eq!(stems(&both, &StemsParams::default()).len(), 1);
+        let high: Vec<Disc> = column(3.0, 14, 26).collect();
+        assert_eq!(stems(&high, &StemsParams::default()).len(), 1);
+    }
+
+    #[test]
+    fn a_stem_hidden_in_the_middle_is_one() {
+        let seen = (0..8).chain(18..26);
+        let discs: Vec<Disc> =
+            seen.map(|s| disc(s, 0.01 * f64::from(s), 0.0, 0.1, Shape::Circle)).collect();
+        let found = stems(&discs, &StemsParams::default());
+        assert_eq!(found.iter().map(|axis| axis.discs.len()).collect::<Vec<_>>(), [16]);
     }
 
     #[test]

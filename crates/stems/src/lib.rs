@@ -2,7 +2,7 @@
 //!
 //! * [`slices`] cuts the lower stem space into horizontal slices and their points into clusters,
 //!   [`disc`] finds a stem's cross-section in a cluster, [`chain`] follows cross-sections from slice
-//!   to slice to a stem.
+//!   to slice to a stem, [`grounded`] leaves out steep branches.
 //! * [`voxels`] thins a plot to the voxels of a lattice that is fixed in the world, [`graph`] links
 //!   them to their neighbours, [`paths`] gives every voxel to the stem with the cheapest way to it.
 //! * [`space`] puts these together; [`wood`] tells wood from leaves.
@@ -13,6 +13,7 @@ pub mod chain;
 pub mod disc;
 pub mod error;
 pub mod graph;
+pub mod grounded;
 pub mod params;
 pub mod paths;
 pub mod slices;

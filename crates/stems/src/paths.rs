@@ -1,8 +1,7 @@
 //! The stem with the cheapest way to every voxel: comparative shortest paths (Tao et al. 2015,
 //! "Segmenting tree crowns from terrestrial and mobile LiDAR data by exploring ecological theories").
 //!
-//! Ways are divided by a power of the stem's diameter, because thicker stems feed wider crowns. A
-//! step costs the square of its length, so that ways keep to what is densely sampled.
+//! Ways are divided by a power of the stem's diameter, because thicker stems feed wider crowns.
 
 use crate::graph::Graph;
 use std::cmp::{Ordering, Reverse};
@@ -67,7 +66,7 @@ pub fn cheapest(graph: &Graph, sources: &[Source]) -> Vec<u32> {
         }
         (label[at], cost[at]) = (end.label, end.cost);
         for (to, length_m) in graph.neighbours(end.at) {
-            let next = end.cost + length_m * length_m / end.scale;
+            let next = end.cost + length_m / end.scale;
             if label[to as usize] == UNREACHED && next <= cost[to as usize] {
                 cost[to as usize] = next;
                 let End { label, scale, .. } = end;

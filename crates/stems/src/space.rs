@@ -3,6 +3,7 @@
 use crate::chain::stems;
 use crate::disc::discs;
 use crate::graph::Graph;
+use crate::grounded::without_branches;
 use crate::paths::{Source, UNREACHED, cheapest};
 use crate::slices::{SlicePoint, clusters};
 use crate::voxels::Voxels;
@@ -22,6 +23,10 @@ const UNDERGROWTH_DIAMETER_M: f64 = 0.02;
 const UNDERGROWTH_HEIGHT_M: f64 = 0.5;
 /// A stem is wider than its cross-sections by this much where voxels are given to it, m.
 const BARK_M: f64 = 0.03;
+/// Height of the foot of a tree without ground whose middle is its base, m.
+const FOOT_HEIGHT_M: f64 = 0.3;
+/// A foot wider than this is no stem's, m.
+const WIDEST_FOOT_M: f64 = 1.0;
 /// Part of the lowest points that a tree without ground stands on.
 const FOOT_SHARE: f64 = 0.002;
 
@@ -93,8 +98,9 @@ pub fn trees(
     check_depth(&positions)?;
     let clusters = clusters(slice_points, params)?;
     let found: Vec<_> = clusters.par_iter().flat_map_iter(|one| discs(one, params)).collect();
-    let axes = stems(&found, params);
-    let scene = Scene { voxels, positions: &positions, frame, has_ground, params };
+    let foot_m = foot_m(voxels) - frame.origin_m[2] as f64;
+    let scene = Scene { voxels, positions: &positions, frame, has_ground, foot_m, params };
+    let axes = scene.without_branches(stems(&found, params))?;
     match axes.is_empty() {
         false => scene.by_stems(axes),
         true if !has_ground => scene.one_tree(),
@@ -135,10 +141,20 @@ struct Scene<'a> {
     positions: &'a [[f64; 3]],
     frame: &'a Frame,
     has_ground: bool,
+    /// [`foot_m`] in the frame, m.
+    foot_m: f64,
     params: &'a StemsParams,
 }
 
 impl Scene<'_> {
+    fn without_branches(&self, axes: Vec<StemAxis>) -> Result<Vec<StemAxis>, Error> {
+        let all = 0..self.positions.len() as u32;
+        let kept: Vec<u32> = all.filter(|&at| !self.is_ground(at)).collect();
+        let positions: Vec<[f64; 3]> = kept.iter().map(|&at| self.positions[at as usize]).collect();
+        let heights: Vec<f64> = kept.iter().map(|&at| self.height_m(at)).collect();
+        without_branches(axes, &positions, &heights, self.has_ground, self.params)
+    }
+
     /// Gives voxels to the stems that were seen.
     fn by_stems(&self, mut axes: Vec<StemAxis>) -> Result<Space, Error> {
         axes.sort_by(|a, b| {
@@ -163,8 +179,12 @@ impl Scene<'_> {
         Ok(Space { trees, owner })
     }
 
+    /// Height above ground, or above the lowest points, m.
     fn height_m(&self, at: u32) -> f64 {
-        f64::from(self.voxels.all[at as usize].height_m)
+        match self.has_ground {
+            true => f64::from(self.voxels.all[at as usize].height_m),
+            false => self.positions[at as usize][2] - self.foot_m,
+        }
     }
 
     fn is_ground(&self, at: u32) -> bool {
@@ -205,10 +225,31 @@ impl Scene<'_> {
 
     fn tree(&self, tree: u32, axis: StemAxis, owner: &[u32]) -> Tree {
         let z_m = self.base_elevation_m(tree, &axis, owner);
-        let [x, y] = axis.at_elevation(z_m);
+        let foot = if self.has_ground { None } else { self.foot(tree, owner, z_m) };
+        let [x, y] = foot.unwrap_or_else(|| axis.at_elevation(z_m));
         let base_m = self.frame.world_from_local([x, y, z_m]);
         let dbh_m = axis.diameter_at(BREAST_HEIGHT_M, self.params);
         Tree { base_m, on_ground: self.has_ground, dbh_m, axis: Some(axis) }
+    }
+
+    /// Middle of a tree's lowest voxels in the plane, where they lie close together: nearer to the
+    /// base than a stem's line from far above.
+    fn foot(&self, tree: u32, owner: &[u32], z_m: f64) -> Option<[f64; 2]> {
+        let own = (0..owner.len()).filter(|&at| owner[at] == tree);
+        let low: Vec<[f64; 3]> =
+            own.map(|at| self.positions[at]).filter(|p| p[2] <= z_m + FOOT_HEIGHT_M).collect();
+        let range = |axis: usize| {
+            let values = || low.iter().map(|p| p[axis]);
+            (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
+        };
+        let ((west, east), (south, north)) = (range(0), range(1));
+        let width_m = (east - west).max(north - south);
+        let median = |axis: usize| {
+            let mut values: Vec<f64> = low.iter().map(|p| p[axis]).collect();
+            values.sort_by(f64::total_cmp);
+            values[values.len() / 2]
+        };
+        (width_m <= WIDEST_FOOT_M).then(|| [median(0), median(1)])
     }
 
     /// Elevation of the ground at a stem, or of a tree's lowest voxels, in the frame.

@@ -11,6 +11,7 @@
 mod cases;
 mod resume;
 mod support;
+mod trees;
 
 #[test]
 #[ignore = "the other side of the tests here"]

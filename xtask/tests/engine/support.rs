@@ -62,7 +62,7 @@ fn linger() {
     std::thread::sleep(Duration::from_millis(wait.unwrap_or(0)));
 }
 
-fn trip(inputs: &Inputs) -> Result<(), StageError> {
+pub(crate) fn trip(inputs: &Inputs) -> Result<(), StageError> {
     let unit = inputs.unit().to_string();
     match std::env::var("XTASK_TEST_FAIL") {
         Ok(fail) if fail == unit => Err("tripped on purpose".into()),
@@ -240,7 +240,9 @@ pub(crate) fn child() {
         Ok("2") => erase::<Sum<2>>(),
         _ => erase::<Sum<1>>(),
     };
-    let registry = Registry::new(vec![erase::<Scan>(), sum, erase::<Blur>(), erase::<Finish>()]);
+    let mut stages = vec![erase::<Scan>(), sum, erase::<Blur>(), erase::<Finish>()];
+    stages.extend(crate::trees::stages());
+    let registry = Registry::new(stages);
     let program = Program { registry, surveyor: Box::new(TextSurveyor), cancel: &CANCEL };
     xtask::engine::panics::quieten();
     let code =
