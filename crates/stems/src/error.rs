@@ -5,11 +5,13 @@
 #[non_exhaustive]
 pub enum Error {
     /// There are too few points for a tree.
-    #[error("{found} points: a tree takes at least {needed}; check the filters of `tiles`")]
+    #[error("{found} {what}: a tree takes at least {needed}; check the filters of `tiles`")]
     TooFewPoints {
-        /// Points there are.
+        /// What is counted: points or voxels.
+        what: &'static str,
+        /// How many there are.
         found: usize,
-        /// Points it takes.
+        /// How many it takes.
         needed: usize,
     },
     /// All points lie in a plane or on a line.

@@ -3,7 +3,7 @@
 mod tree_cloud;
 
 use crate::slices::{SlicePoint, slices_of};
-use crate::space::{Space, foot_m, ground_share, trees};
+use crate::space::{Space, foot_m, shows_ground, trees};
 use crate::voxels::Sample;
 use crate::{Error, StemsParams, Voxels};
 use timberline_artefact::kinds::{
@@ -55,7 +55,7 @@ impl Stage for StemsStage {
 
     fn run(params: &StemsParams, inputs: &Inputs, context: &Context<'_>) -> Result<(), StageError> {
         let (voxels, located) = voxels(inputs, params, context)?;
-        let has_ground = ground_share(&voxels) >= params.ground_share;
+        let has_ground = shows_ground(&voxels, params.ground_share);
         let mut bounds = Bounds3::EMPTY;
         voxels.all.iter().for_each(|voxel| bounds.include(voxel.centroid_m()));
         let frame = if voxels.all.is_empty() { Frame::default() } else { Frame::near(bounds.min) };
@@ -172,6 +172,11 @@ fn stems(voxels: &Voxels, space: &Space) -> Result<Stems, Error> {
     let mut order: Vec<(Stem, usize)> =
         (0..space.trees.len()).map(|place| (stem(place), place)).collect();
     order.sort_by_key(|(stem, place)| (stem.tree_id, *place));
+    // Twins from one stool may share the 0.1 m that an id tells apart.
+    for next in 1..order.len() {
+        let after = order[next - 1].0.tree_id + 1;
+        order[next].0.tree_id = order[next].0.tree_id.max(after);
+    }
     let mut rank = vec![u32::MAX; space.trees.len()];
     (0..).zip(&order).for_each(|(new, (_, place))| rank[*place] = new);
     Ok(Stems {

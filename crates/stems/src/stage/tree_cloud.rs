@@ -40,7 +40,7 @@ impl Stage for TreeCloudStage {
         let (cloud, located) = gather(inputs, &stem, context)?;
         if cloud.len() < params.smallest_points as usize {
             let needed = params.smallest_points as usize;
-            return Err(Error::TooFewPoints { found: cloud.len(), needed }.into());
+            return Err(Error::TooFewPoints { what: "points", found: cloud.len(), needed }.into());
         }
         let mut cloud = cloud.in_canonical_order();
         let positions: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
