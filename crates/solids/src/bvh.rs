@@ -146,6 +146,26 @@ impl Bvh {
         }
         best
     }
+
+    /// Whether any item whose box holds a position fulfils a condition.
+    pub(crate) fn any_around(&self, position: [f64; 3], condition: impl Fn(u32) -> bool) -> bool {
+        let mut stack = if self.nodes.is_empty() { Vec::new() } else { vec![0u32] };
+        while let Some(place) = stack.pop() {
+            let node = &self.nodes[place as usize];
+            if node.bounds.squared_distance(position) > 0.0 {
+                continue;
+            }
+            if node.count == 0 {
+                stack.extend([place + 1, node.place]);
+            } else {
+                let items = &self.items[node.place as usize..][..node.count as usize];
+                if items.iter().any(|item| condition(*item)) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
 }
 
 fn nearer(a: Best, b: Best) -> Best {

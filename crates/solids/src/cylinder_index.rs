@@ -61,6 +61,17 @@ impl CylinderIndex {
         chunks.collect::<Vec<_>>().concat()
     }
 
+    /// Whether a position lies inside another cylinder than the one named, and not just on its surface.
+    #[must_use]
+    pub fn is_inside_another(&self, position_m: [f64; 3], cylinder: u32) -> bool {
+        /// Rounding of positions within kilometres of the frame's origin.
+        const ON_THE_SURFACE_M: f64 = 1e-9;
+        self.bvh.any_around(position_m, |item| {
+            let other = &self.cylinders[item as usize];
+            item != cylinder && other.signed_distance_m(position_m) < -ON_THE_SURFACE_M
+        })
+    }
+
     fn search(&self, position_m: [f64; 3], guess: Option<u32>) -> Option<Best> {
         if !position_m.iter().all(|value| value.is_finite()) {
             return None;
