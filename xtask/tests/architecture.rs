@@ -336,7 +336,7 @@ mod architecture {
             "ctrlc",
             "tracing-subscriber",
         ];
-        let homes: [(&[&str], &[&str]); 12] = [
+        let homes: [(&[&str], &[&str]); 13] = [
             (terminal, &["xtask"]),
             (&["laz"], &["ingest"]),
             (&["las"], &["export", "segmentation"]),
@@ -347,7 +347,9 @@ mod architecture {
                 &["export"],
             ),
             (&["image", "plotters", "plotters-backend", "plotly", "ab_glyph"], &["report"]),
-            (&["bincode", "mcap", "foxglove"], &["artefact"]),
+            (&["bincode"], &["artefact"]),
+            // Artefacts, and recordings of single trees for viewers.
+            (&["mcap", "foxglove"], &["artefact", "export"]),
             (&["faer"], &["ground"]),
             // Surfaces through points: of the ground, and of the canopy.
             (&["spade"], &["ground", "segmentation"]),
