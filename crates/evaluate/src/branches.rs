@@ -21,10 +21,10 @@ impl Branch {
         self.cylinders.iter().map(|c| 2.0 * c.radius_m).fold(0.0, f64::max)
     }
 
-    /// Length, m.
+    /// Length, m, without cylinders that are not finite.
     #[must_use]
     pub fn length_m(&self) -> f64 {
-        self.cylinders.iter().map(Cylinder::length_m).sum()
+        self.cylinders.iter().map(Cylinder::length_m).filter(|length| length.is_finite()).sum()
     }
 }
 
@@ -133,7 +133,8 @@ pub fn assess_branches(
         accuracy.each(branch, params, |counts| {
             counts.model += 1;
             counts.model_m += length_m;
-            counts.false_branches += u32::from(met_m < params.share * length_m || length_m <= 0.0);
+            let is_real = length_m > 0.0 && met_m >= params.share * length_m;
+            counts.false_branches += u32::from(!is_real);
             counts.false_m += (length_m - met_m).max(0.0);
         });
     }

@@ -104,7 +104,7 @@ fn cloud(base_m: [f64; 3], frame: Frame) -> PointCloud {
         cloud.push_world(world.map(timberline_pointcloud::frame::quantise), &point);
     }
     cloud.extra.insert(TreeCloud::WOOD.to_owned(), Column::F32(vec![0.9; cloud.len()]));
-    cloud
+    cloud.in_canonical_order()
 }
 
 fn skeleton(qsm: &Qsm) -> Skeleton {

@@ -126,7 +126,7 @@ fn cloud(qsm: &Qsm, frame: Frame) -> PointCloud {
         let leaves = qsm.branches[c.branch as usize].order > 0;
         for i in 0..count {
             let number = place * 131 + i + 1;
-            let (sin, cos) = libm::sincos(draw(number, 0.7549) * 6.283);
+            let (sin, cos) = libm::sincos(draw(number, 0.7549) * std::f64::consts::TAU);
             let share = draw(number, 0.5698);
             let is_leaf = leaves && i % 2 == 0;
             let reach = if is_leaf { 0.25 * draw(number, 0.81) } else { c.radius_m };
@@ -140,7 +140,7 @@ fn cloud(qsm: &Qsm, frame: Frame) -> PointCloud {
         }
     }
     cloud.extra.insert(TreeCloud::WOOD.to_owned(), Column::F32(wood));
-    cloud
+    cloud.in_canonical_order()
 }
 
 /// Two trees with models and one without.

@@ -191,7 +191,7 @@ impl Plot {
         self.taper.extend(taper_columns::rows(&model));
         self.orders.extend(order_columns::rows(&model));
         let branches = scene::branches(&model, fineness, least_radius_m);
-        let offset_m = self.origin.shift_from(&frame).map(|value| 0.0 - value);
+        let offset_m = self.origin.shift_from(&frame);
         let extras = json!({ "tree_id": qsm.tree_id });
         let name = qsm.tree_id.to_string();
         self.parts.push(glb::Part::of(name, offset_m, &branches, extras));
