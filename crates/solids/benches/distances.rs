@@ -1,11 +1,12 @@
-//! What distances to many cylinders cost.
+//! What distances to many cylinders and triangles cost, and the closed surface of a model.
 //!
 //! `cargo bench -p timberline-solids`
 #![allow(missing_docs, reason = "criterion's macros make public items")]
 
 use criterion::{Criterion, criterion_group, criterion_main};
 use std::hint::black_box;
-use timberline_solids::{Cylinder, CylinderIndex};
+use timberline_solids::closed::{RoundCone, cell_for, closed};
+use timberline_solids::{Cylinder, CylinderIndex, MeshIndex};
 
 /// Numbers between 0 and 1 that look random (xorshift, Marsaglia 2003).
 struct Draw(u64);
@@ -60,5 +61,26 @@ fn distances(criterion: &mut Criterion) {
     group.finish();
 }
 
-criterion_group!(benches, distances);
+fn surfaces(criterion: &mut Criterion) {
+    let cylinders = cylinders(10_000);
+    let points = points(&cylinders, 1_000_000);
+    let cone =
+        |c: &Cylinder| RoundCone { start: (c.start_m, c.radius_m), end: (c.end_m, c.radius_m) };
+    let cones: Vec<RoundCone> = cylinders.iter().map(cone).collect();
+    let cell_m = cell_for(&cones, 300_000, 0.005);
+    let mesh = closed(&cones, cell_m).mesh;
+    let mut group = criterion.benchmark_group("surfaces");
+    group.sample_size(10);
+    let name = format!("closed surface of 10k cylinders, {} triangles", mesh.triangles.len());
+    group.bench_function(name, |bencher| {
+        bencher.iter(|| closed(black_box(&cones), cell_m));
+    });
+    let index = MeshIndex::new(&mesh);
+    group.bench_function("1M points to that surface", |bencher| {
+        bencher.iter(|| index.nearest_all(black_box(&points)));
+    });
+    group.finish();
+}
+
+criterion_group!(benches, distances, surfaces);
 criterion_main!(benches);

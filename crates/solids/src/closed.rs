@@ -24,6 +24,10 @@ const LEAST_RADIUS: f64 = 0.866_025_403_784_438_6;
 /// directions: 6.8 to 8.6, test `the_number_of_triangles_is_foreseen`).
 const TRIANGLES_A_SQUARE: f64 = 8.6;
 
+/// Corners that are looked at for every triangle at most: memory stays bounded for clumsy models, too (a
+/// fat ball has many corners inside and few triangles).
+const CORNERS_A_TRIANGLE: f64 = 50.0;
+
 /// A ball that changes its radius evenly on its way.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RoundCone {
@@ -71,6 +75,13 @@ impl RoundCone {
         std::f64::consts::PI * (ra + rb) * distance(a, b)
     }
 
+    /// Volume of the box in which a grid's corners are looked at, m3.
+    fn box_m3(&self, cell_m: f64) -> f64 {
+        let ((a, ra), (b, rb)) = (self.start, self.end);
+        let margin = 2.0 * (ra.max(rb) + BAND * cell_m);
+        (0..3).map(|axis| (a[axis] - b[axis]).abs() + margin).product()
+    }
+
     fn is_finite(&self) -> bool {
         let ((a, ra), (b, rb)) = (self.start, self.end);
         a.iter().chain(&b).chain([&ra, &rb]).all(|value| value.is_finite()) && ra.min(rb) >= 0.0
@@ -102,15 +113,20 @@ pub struct Closed {
     pub thickened: u64,
 }
 
-/// The smallest edge of a grid, not below `finest_m`, with which a model has about so many triangles.
+/// The smallest edge of a grid, not below `finest_m`, with which a model has about so many triangles and
+/// not very many corners inside for each of them.
 #[must_use]
 pub fn cell_for(cones: &[RoundCone], triangles: u64, finest_m: f64) -> f64 {
-    let area = |cell_m: f64| {
-        let least = LEAST_RADIUS * cell_m;
-        cones.iter().filter(|c| c.is_finite()).map(|c| c.at_least(least).area_m2()).sum::<f64>()
+    let fits = |cell_m: f64| {
+        let thick = cones.iter().filter(|c| c.is_finite());
+        let thick = thick.map(|cone| cone.at_least(LEAST_RADIUS * cell_m));
+        let (area, volume) = thick.fold((0.0, 0.0), |(area, volume), cone| {
+            (area + cone.area_m2(), volume + cone.box_m3(cell_m))
+        });
+        let corners = volume / (cell_m * cell_m * cell_m);
+        area * TRIANGLES_A_SQUARE <= triangles as f64 * cell_m * cell_m
+            && corners <= triangles as f64 * CORNERS_A_TRIANGLE
     };
-    let fits =
-        |cell_m: f64| area(cell_m) * TRIANGLES_A_SQUARE <= triangles as f64 * cell_m * cell_m;
     let mut cell_m = finest_m.max(1e-4);
     // In steps of 5 %: the area itself grows with the least radius.
     while !fits(cell_m) && cell_m < 10.0 {

@@ -115,7 +115,8 @@ mod tests {
         assert_eq!(found[0].diameter_m, 0.4);
         let total: f64 = found.iter().map(|row| row.length_m).sum();
         let model = Model { qsm: &qsm, frame: FRAME, crs: &crs };
-        let expected: f64 = model.cylinders().iter().map(|c| c.length_m()).sum();
+        let expected: f64 =
+            model.cylinders().iter().map(timberline_solids::Cylinder::length_m).sum();
         assert!((total - expected).abs() < 1e-12);
     }
 }

@@ -108,6 +108,7 @@ fn rods(qsm: &Qsm, by: ColourBy) -> Vec<Rod> {
     let rod = |c: &timberline_artefact::kinds::QsmCylinder| Rod {
         ends_m: [c.start_m, c.end_m],
         radius_m: c.radius_m,
+        flat_start: c.parent.is_none(),
         colour: match by {
             ColourBy::Source => source(c.source),
             ColourBy::Order => ORDERS[order_of(qsm, c.branch)],

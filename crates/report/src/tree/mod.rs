@@ -266,7 +266,12 @@ mod tests {
     const GREEN: Rgb = [0, 158, 115];
 
     fn stem() -> Rod {
-        Rod { ends_m: [[0.0, 0.0, 0.0], [0.0, 0.0, 10.0]], radius_m: 0.25, colour: GREEN }
+        Rod {
+            ends_m: [[0.0, 0.0, 0.0], [0.0, 0.0, 10.0]],
+            radius_m: 0.25,
+            colour: GREEN,
+            flat_start: true,
+        }
     }
 
     fn picture<'a>(points: &'a [([f64; 3], f32)], rods: &'a [Rod]) -> TreePicture<'a> {

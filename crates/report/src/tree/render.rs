@@ -7,8 +7,10 @@ use crate::colour::{PAPER, Rgb, mix};
 const FINER: usize = 2;
 /// Least half width of a cylinder in drawn pixels: twigs stay visible.
 const LEAST_PX: f64 = 0.9;
-/// Half width of a point in drawn pixels.
-const POINT_PX: i64 = 1;
+/// Width of a point in drawn pixels, and of points so few that they would look pale.
+const POINT_PX: i64 = 2;
+const FEW_POINT_PX: i64 = 3;
+const FEW: usize = 50_000;
 /// Light from above left in front, of length 1: across, upwards, towards the eye.
 const LIGHT: [f64; 3] = [-0.48, 0.6, 0.64];
 /// Light where none falls.
@@ -25,6 +27,8 @@ pub struct Rod {
     pub radius_m: f64,
     /// Colour.
     pub colour: Rgb,
+    /// Whether it ends flat where it starts: the foot of a stem.
+    pub flat_start: bool,
 }
 
 impl Rod {
@@ -95,12 +99,13 @@ impl Raster {
         let (near, far) = placed
             .clone()
             .fold((f64::NEG_INFINITY, f64::INFINITY), |(n, f), (p, _)| (n.max(p[2]), f.min(p[2])));
+        let size = if placed.clone().take(FEW).count() < FEW { FEW_POINT_PX } else { POINT_PX };
         for ([x, y, depth], colour) in placed {
             let share = (near - depth) / (near - far).max(1e-9);
             let colour = mix(colour, PAPER, HAZE * share);
-            let (x, y) = (x.floor() as i64, y.floor() as i64);
-            for row in y - POINT_PX + 1..=y + POINT_PX {
-                for column in x - POINT_PX + 1..=x + POINT_PX {
+            let first = [x, y].map(|value| value.floor() as i64 - size / 2);
+            for row in first[1]..first[1] + size {
+                for column in first[0]..first[0] + size {
                     self.put([column, row], depth, colour);
                 }
             }
@@ -126,7 +131,7 @@ impl Raster {
                     let share = if squared > 0.0 { (along / squared).clamp(0.0, 1.0) } else { 0.0 };
                     let off = [at[0] - from[0] - share * way[0], at[1] - from[1] - share * way[1]];
                     let rest = radius * radius - off[0] * off[0] - off[1] * off[1];
-                    if rest < 0.0 {
+                    if rest < 0.0 || (rod.flat_start && along < 0.0) {
                         continue;
                     }
                     let up = rest.sqrt();

@@ -113,6 +113,14 @@ fn the_number_of_triangles_is_foreseen() {
 }
 
 #[test]
+fn a_fat_ball_does_not_fill_the_memory() {
+    let fat = cone([0.0; 3], 50.0, [0.0, 0.0, 0.01], 50.0);
+    let cell_m = cell_for(&[fat], 10_000, 0.005);
+    assert!(100.0f64.powi(3) / cell_m.powi(3) < 500_000.0, "{cell_m}");
+    assert!(closed(&[fat], cell_m).mesh.is_watertight());
+}
+
+#[test]
 fn nothing_comes_of_nothing() {
     assert_eq!(closed(&[], 0.1).mesh, Mesh::default());
     assert_eq!(closed(&[cone([0.0; 3], 1.0, [1.0; 3], 1.0)], 0.0), Closed::default());
