@@ -36,14 +36,15 @@ impl OutputFolder {
         &self.scratch
     }
 
-    /// Announces a file and says where to write it for now.
+    /// Announces a file and says where to write it for now. The name may hold folders, with `/`; the
+    /// caller makes them (`std::fs::create_dir_all` of the parent).
     pub fn file(&mut self, name: &str) -> PathBuf {
         self.names.insert(name.to_owned());
         self.scratch.join(name)
     }
 
     /// Lets all announced files appear, after removing earlier files of the stage that are not among
-    /// them (`is_ours` knows them by name). Returns the files, sorted by name.
+    /// them (`is_ours` knows them by name; a folder it knows by its name and `/` goes when it is empty). Returns the files, sorted by name.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -58,6 +59,8 @@ impl OutputFolder {
         self.remove_stale(is_ours)?;
         for name in &self.names {
             let target = self.folder.join(name);
+            let parent = target.parent().unwrap_or(&self.folder);
+            std::fs::create_dir_all(parent).map_err(Error::io(parent, "create"))?;
             std::fs::rename(self.scratch.join(name), &target)
                 .map_err(Error::io(&target, "rename to"))?;
         }
@@ -69,13 +72,30 @@ impl OutputFolder {
     }
 
     fn remove_stale(&self, is_ours: impl Fn(&str) -> bool) -> Result<(), Error> {
-        let entries = std::fs::read_dir(&self.folder).map_err(Error::io(&self.folder, "read"))?;
-        for entry in entries {
-            let entry = entry.map_err(Error::io(&self.folder, "read"))?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if is_ours(&name) && !self.names.contains(&name) {
-                std::fs::remove_file(entry.path()).map_err(Error::io(&entry.path(), "remove"))?;
+        let mut below = vec![String::new()];
+        let mut folders = Vec::new();
+        while let Some(prefix) = below.pop() {
+            let folder = self.folder.join(&prefix);
+            let entries = std::fs::read_dir(&folder).map_err(Error::io(&folder, "read"))?;
+            for entry in entries {
+                let entry = entry.map_err(Error::io(&folder, "read"))?;
+                let file_name = entry.file_name().to_string_lossy().into_owned();
+                let name = format!("{prefix}{file_name}");
+                let is_folder = entry.file_type().is_ok_and(|kind| kind.is_dir());
+                if is_folder && !file_name.starts_with(TEMP_PREFIX) {
+                    if is_ours(&format!("{name}/")) {
+                        folders.push(entry.path());
+                    }
+                    below.push(format!("{name}/"));
+                } else if is_ours(&name) && !self.names.contains(&name) {
+                    std::fs::remove_file(entry.path())
+                        .map_err(Error::io(&entry.path(), "remove"))?;
+                }
             }
+        }
+        // The deepest first; a folder in which something is left refuses, and stays.
+        for folder in folders.iter().rev() {
+            std::fs::remove_dir(folder).unwrap_or_default();
         }
         Ok(())
     }
@@ -125,6 +145,25 @@ mod tests {
         assert_eq!(names(folder.path()), ["dtm.tif", "notes.txt"]);
         assert_eq!((files[0].name.as_str(), files[0].bytes), ("dtm.tif", 3));
         assert_eq!(files, [OutputFile::describe(folder.path(), "dtm.tif").unwrap()]);
+    }
+
+    #[test]
+    fn folders_come_and_go_with_their_files() {
+        let folder = tempfile::tempdir().unwrap();
+        let publish = |tree: &str| {
+            let mut output = OutputFolder::open(folder.path(), "tables").unwrap();
+            let path = output.file(&format!("trees/{tree}/qsm.csv"));
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, tree).unwrap();
+            output.publish(|name| name.starts_with("trees/")).unwrap()
+        };
+        assert_eq!(publish("1")[0].name, "trees/1/qsm.csv");
+        std::fs::create_dir_all(folder.path().join("mine/own")).unwrap();
+        std::fs::write(folder.path().join("mine/own/notes.txt"), "x").unwrap();
+        publish("2");
+        assert_eq!(names(&folder.path().join("trees")), ["2"]);
+        assert_eq!(std::fs::read(folder.path().join("trees/2/qsm.csv")).unwrap(), b"2");
+        assert_eq!(names(folder.path()), ["mine", "trees"]);
     }
 
     #[test]

@@ -5,6 +5,9 @@
 //! as a terrain model ([`stats`]), crown boxes ([`boxes`]) and point labels ([`labels`]); [`report`]
 //! gathers them in a structure that serialises and prints as a table. Files are the caller's affair.
 //!
+//! Tree models: distances between points and models ([`distances`]), false and missing branches and
+//! volumes ([`branches`]), stems found and their diameters ([`stems`]).
+//!
 //! All positions and lengths are metres, in any one frame. No result depends on the order of input.
 //!
 //! ```
@@ -20,17 +23,23 @@
 
 mod assignment;
 pub mod boxes;
+pub mod branches;
+pub mod distances;
 mod error;
 pub mod labels;
 pub mod matching;
 pub mod report;
 pub mod stats;
+pub mod stems;
 pub mod trees;
 
 pub use boxes::{BoxAccuracy, match_boxes};
+pub use branches::{Branch, BranchAccuracy, BranchParams, Volumes, assess_branches};
+pub use distances::{BothWays, CylinderModel, Hausdorff};
 pub use error::Error;
 pub use labels::{LabelAccuracy, assess_labels};
 pub use matching::{MatchParams, MatchRule, Matching, Pair, match_trees};
 pub use report::Report;
 pub use stats::ErrorStats;
+pub use stems::{Stem, StemAccuracy, assess_stems};
 pub use trees::{Accuracy, Layer, Tree, TreeAccuracy, assess_trees, layers};

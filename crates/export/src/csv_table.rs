@@ -1,7 +1,7 @@
-//! `trees.csv` and its dictionary.
+//! Tables as CSV and their dictionaries.
 
 use crate::Error;
-use crate::table::Kind;
+use crate::table::{Column, Kind};
 use crate::tree_columns::TREE_COLUMNS;
 use std::io::Write;
 use std::path::Path;
@@ -18,26 +18,52 @@ pub fn write_trees(
     crs: &Crs,
     trees: impl Iterator<Item = Result<Tree, Error>>,
 ) -> Result<(), Error> {
-    let fail = |source| Error::Csv { path: path.to_path_buf(), source };
-    let mut writer = csv::Writer::from_writer(out);
-    writer.write_record(TREE_COLUMNS.iter().map(|column| column.name)).map_err(fail)?;
-    for tree in trees {
-        let tree = tree?;
-        let row = TREE_COLUMNS.iter().map(|column| column.text(&tree, crs));
-        writer.write_record(row).map_err(fail)?;
-    }
-    writer.flush().map_err(Error::io(path, "write"))
+    write_table(out, path, TREE_COLUMNS, crs, trees)
 }
 
-/// Writes the dictionary: one line a column with its type, unit, meaning and range.
+/// Writes the dictionary of the tree table: one line a column with its type, unit, meaning and range.
 ///
 /// # Errors
 /// [`Error::Csv`].
 pub fn write_dictionary(out: impl Write, path: &Path, crs: &Crs) -> Result<(), Error> {
+    write_dictionary_of(out, path, TREE_COLUMNS, crs)
+}
+
+/// Writes a table row by row, in the order given, with a header line; `path` is for messages.
+///
+/// # Errors
+/// [`Error::Csv`], or what the iterator yields.
+pub fn write_table<T>(
+    out: impl Write,
+    path: &Path,
+    columns: &[Column<T>],
+    crs: &Crs,
+    rows: impl Iterator<Item = Result<T, Error>>,
+) -> Result<(), Error> {
+    let fail = |source| Error::Csv { path: path.to_path_buf(), source };
+    let mut writer = csv::Writer::from_writer(out);
+    writer.write_record(columns.iter().map(|column| column.name)).map_err(fail)?;
+    for row in rows {
+        let row = row?;
+        writer.write_record(columns.iter().map(|column| column.text(&row, crs))).map_err(fail)?;
+    }
+    writer.flush().map_err(Error::io(path, "write"))
+}
+
+/// Writes the dictionary of a table: one line a column with its type, unit, meaning and range.
+///
+/// # Errors
+/// [`Error::Csv`].
+pub fn write_dictionary_of<T>(
+    out: impl Write,
+    path: &Path,
+    columns: &[Column<T>],
+    crs: &Crs,
+) -> Result<(), Error> {
     let fail = |source| Error::Csv { path: path.to_path_buf(), source };
     let mut writer = csv::Writer::from_writer(out);
     writer.write_record(["column", "type", "unit", "meaning", "range"]).map_err(fail)?;
-    for column in TREE_COLUMNS {
+    for column in columns {
         let kind = match column.kind {
             Kind::Integer => "integer".to_owned(),
             Kind::Real(decimals) => format!("number, {decimals} decimals"),

@@ -126,6 +126,9 @@ pub enum Error {
         /// The id.
         id: u64,
     },
+    /// A recording for viewers could not be made.
+    #[error("the MCAP recording of a tree cannot be written: {0}")]
+    Recording(String),
     /// An artefact could not be read or an output not be published.
     #[error(transparent)]
     Artefact(#[from] timberline_artefact::Error),

@@ -8,6 +8,11 @@ mod points;
 mod rasters;
 mod survey;
 mod tables;
+mod tree_models;
+mod tree_tables;
+
+pub use tree_models::{Params as TreeModelsParams, TreeModelsStage};
+pub use tree_tables::{Params as TreeTablesParams, TreeTablesStage};
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};

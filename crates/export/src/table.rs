@@ -1,4 +1,4 @@
-//! What a column of the tree table is: one description for CSV, its dictionary and the GeoPackage.
+//! What a column of a table is: one description for CSV, its dictionary and the GeoPackage.
 
 use crate::crs::unit_name;
 use timberline_artefact::Crs;
@@ -52,9 +52,9 @@ impl Unit {
     }
 }
 
-/// One column.
-#[derive(Debug, Clone, Copy)]
-pub struct Column {
+/// One column of a table about things of one type.
+#[derive(Debug)]
+pub struct Column<T = Tree> {
     /// Name, the same in every format.
     pub name: &'static str,
     /// Type.
@@ -65,15 +65,23 @@ pub struct Column {
     pub meaning: &'static str,
     /// Values that occur.
     pub range: &'static str,
-    /// The value of a tree.
-    pub value: fn(&Tree, &Crs) -> Value,
+    /// The value of a row.
+    pub value: fn(&T, &Crs) -> Value,
 }
 
-impl Column {
-    /// The value of a tree as text: fixed decimals, empty where missing.
+impl<T> Clone for Column<T> {
+    fn clone(&self) -> Self {
+        *self
+    }
+}
+
+impl<T> Copy for Column<T> {}
+
+impl<T> Column<T> {
+    /// The value of a row as text: fixed decimals, empty where missing.
     #[must_use]
-    pub fn text(&self, tree: &Tree, crs: &Crs) -> String {
-        match (self.value_of(tree, crs), self.kind) {
+    pub fn text(&self, row: &T, crs: &Crs) -> String {
+        match (self.value_of(row, crs), self.kind) {
             (None, _) => String::new(),
             (Some(Value::Integer(value)), _) => value.to_string(),
             (Some(Value::Text(value)), _) => value,
@@ -82,12 +90,12 @@ impl Column {
         }
     }
 
-    /// The value of a tree, rounded to the column's decimals; `None` where it is missing.
+    /// The value of a row, rounded to the column's decimals; `None` where it is missing.
     ///
     /// Rounded values are the same in every format, and never -0.
     #[must_use]
-    pub fn value_of(&self, tree: &Tree, crs: &Crs) -> Option<Value> {
-        match ((self.value)(tree, crs), self.kind) {
+    pub fn value_of(&self, row: &T, crs: &Crs) -> Option<Value> {
+        match ((self.value)(row, crs), self.kind) {
             (Value::Real(value), _) if !value.is_finite() => None,
             (Value::Real(value), Kind::Real(decimals)) => {
                 let step = [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6, 1e7, 1e8][decimals.min(8)];

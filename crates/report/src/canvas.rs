@@ -165,17 +165,24 @@ impl Canvas {
     pub fn write_png(&self, path: &Path) -> Result<(), Error> {
         let fail = |source| Error::Write { path: path.to_path_buf(), source };
         let file = std::fs::File::create(path).map_err(|error| fail(error.into()))?;
-        let out = std::io::BufWriter::new(file);
+        self.encode(std::io::BufWriter::new(file)).map_err(fail)
+    }
+
+    /// The picture as PNG.
+    ///
+    /// # Errors
+    /// [`Error::Encode`].
+    pub fn png(&self) -> Result<Vec<u8>, Error> {
+        let mut bytes = Vec::new();
+        self.encode(&mut bytes).map_err(Error::Encode)?;
+        Ok(bytes)
+    }
+
+    fn encode(&self, out: impl std::io::Write) -> Result<(), image::ImageError> {
         let encoder =
             PngEncoder::new_with_quality(out, CompressionType::Default, FilterType::Adaptive);
-        encoder
-            .write_image(
-                self.pixels.as_flattened(),
-                self.width,
-                self.height,
-                ExtendedColorType::Rgb8,
-            )
-            .map_err(fail)
+        let pixels = self.pixels.as_flattened();
+        encoder.write_image(pixels, self.width, self.height, ExtendedColorType::Rgb8)
     }
 }
 

@@ -14,6 +14,9 @@ pub enum Error {
         /// The reason.
         source: image::ImageError,
     },
+    /// A picture could not be turned into a file.
+    #[error("the picture cannot be encoded: {0}")]
+    Encode(image::ImageError),
     /// The font that comes with the program cannot be read.
     #[error("the built-in font cannot be read: {0}")]
     Font(#[from] ab_glyph::InvalidFont),

@@ -5,6 +5,7 @@
 //!
 //! * [`map`]: the map of a site; [`stage`] makes one for every site of a campaign.
 //! * [`pictures`]: single artefacts, for looking into a store.
+//! * [`tree`]: one tree, points beside its model; [`plot`]: the stems of a plot from above.
 //! * [`chart`]: curves in panels, as PNG and as SVG.
 //! * [`figure`]: title, frame, legend, scale bar and north arrow around either.
 
@@ -17,9 +18,11 @@ pub mod grid;
 pub mod hillshade;
 pub mod map;
 pub mod pictures;
+pub mod plot;
 pub mod stage;
 pub mod text;
 pub mod ticks;
+pub mod tree;
 
 pub use canvas::Canvas;
 pub use chart::Chart;

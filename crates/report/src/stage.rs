@@ -3,6 +3,12 @@
 //! Tiles are read one after the other, twice: to find the sites, and to draw. Memory holds one tile
 //! and the rasters of one map, whose number of cells is bounded.
 
+mod plot_map;
+mod tree_pictures;
+
+pub use plot_map::{Params as PlotMapParams, PlotMapStage};
+pub use tree_pictures::{ColourBy, Params as TreePicturesParams, TreePicturesStage};
+
 use crate::figure::LONGEST_PX;
 use crate::map::{MapContents, MapTree, draw};
 use crate::text::grouped;

@@ -33,9 +33,9 @@ pub struct GeoPackage {
     crs: Crs,
 }
 
-/// A layer of features.
-#[derive(Debug, Clone, Copy)]
-pub struct Layer<'a> {
+/// A layer of features, one for each thing of a type.
+#[derive(Debug)]
+pub struct Layer<'a, T = Tree> {
     /// Table name.
     pub name: &'a str,
     /// What it holds, for people.
@@ -45,9 +45,9 @@ pub struct Layer<'a> {
     /// Whether geometries have a z.
     pub has_z: bool,
     /// The attributes.
-    pub columns: &'a [Column],
-    /// The geometry of a tree; `None` for trees that are not in this layer.
-    pub geometry: fn(&Tree, &Crs) -> Option<Geometry>,
+    pub columns: &'a [Column<T>],
+    /// The geometry of a thing; `None` for those that are not in this layer.
+    pub geometry: fn(&T, &Crs) -> Option<Geometry>,
 }
 
 impl GeoPackage {
@@ -90,10 +90,10 @@ impl GeoPackage {
     ///
     /// # Errors
     /// [`Error::Sqlite`], or what the iterator yields.
-    pub fn add_layer(
+    pub fn add_layer<T>(
         &mut self,
-        layer: &Layer<'_>,
-        trees: &mut dyn Iterator<Item = Result<Tree, Error>>,
+        layer: &Layer<'_, T>,
+        things: &mut dyn Iterator<Item = Result<T, Error>>,
     ) -> Result<u64, Error> {
         let fail = Error::sqlite(&self.path);
         let transaction = self.connection.unchecked_transaction().map_err(&fail)?;
@@ -106,13 +106,13 @@ impl GeoPackage {
             let index =
                 format!("INSERT INTO rtree_{}_geom VALUES (?1, ?2, ?3, ?4, ?5)", layer.name);
             let mut index = self.connection.prepare(&index).map_err(&fail)?;
-            for tree in trees {
-                let tree = tree?;
-                let Some(geometry) = (layer.geometry)(&tree, &self.crs) else { continue };
+            for thing in things {
+                let thing = thing?;
+                let Some(geometry) = (layer.geometry)(&thing, &self.crs) else { continue };
                 rows += 1;
                 let bounds = geometry.bounds();
                 extent.include(bounds);
-                self.insert(&mut insert, rows, &geometry, layer, &tree).map_err(&fail)?;
+                self.insert(&mut insert, rows, &geometry, layer, &thing).map_err(&fail)?;
                 let [min_x, max_x, min_y, max_y] = bounds;
                 index.execute(params![rows, min_x, max_x, min_y, max_y]).map_err(&fail)?;
             }
@@ -123,23 +123,23 @@ impl GeoPackage {
         Ok(rows as u64)
     }
 
-    fn insert(
+    fn insert<T>(
         &self,
         insert: &mut Statement<'_>,
         fid: i64,
         geometry: &Geometry,
-        layer: &Layer<'_>,
-        tree: &Tree,
+        layer: &Layer<'_, T>,
+        thing: &T,
     ) -> rusqlite::Result<usize> {
         let blob = geometry.blob(self.srs_id);
         let values: Vec<Box<dyn ToSql>> =
-            layer.columns.iter().map(|c| sql_value(c.value_of(tree, &self.crs))).collect();
+            layer.columns.iter().map(|c| sql_value(c.value_of(thing, &self.crs))).collect();
         let mut row: Vec<&dyn ToSql> = vec![&fid, &blob];
         row.extend(values.iter().map(AsRef::as_ref));
         insert.execute(row.as_slice())
     }
 
-    fn register(&self, layer: &Layer<'_>, extent: &Extent) -> rusqlite::Result<()> {
+    fn register<T>(&self, layer: &Layer<'_, T>, extent: &Extent) -> rusqlite::Result<()> {
         let [min_x, max_x, min_y, max_y] = extent.values();
         self.connection.execute(
             "INSERT INTO gpkg_contents VALUES (?1, 'features', ?1, ?2, ?3, ?4, ?5, ?6, ?7, ?8)",

@@ -87,7 +87,7 @@ INSERT INTO gpkg_extensions VALUES
 COMMIT;"#;
 
 /// The table of a layer and its index.
-pub(super) fn feature_table(layer: &Layer<'_>) -> String {
+pub(super) fn feature_table<T>(layer: &Layer<'_, T>) -> String {
     let Layer { name, geometry_type, columns, .. } = layer;
     let columns: String =
         columns.iter().map(|c| format!(",\n  \"{}\" {}", c.name, sql_type(c.kind))).collect();
@@ -107,7 +107,7 @@ pub(super) fn attribute_table(name: &str) -> String {
 }
 
 /// `INSERT` with a place for fid, geometry and every column.
-pub(super) fn insert_statement(name: &str, columns: &[Column]) -> String {
+pub(super) fn insert_statement<T>(name: &str, columns: &[Column<T>]) -> String {
     let names: String = columns.iter().map(|c| format!(", \"{}\"", c.name)).collect();
     let places: String = (3..columns.len() + 3).map(|place| format!(", ?{place}")).collect();
     format!("INSERT INTO \"{name}\" (fid, geom{names}) VALUES (?1, ?2{places})")
