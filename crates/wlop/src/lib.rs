@@ -1,0 +1,6 @@
+//! Consolidation.
+
+pub mod error;
+pub mod operator;
+
+pub use error::Error;
