@@ -36,7 +36,7 @@ use rayon::prelude::*;
 use timberline_pointcloud::frame::MAX_COORDINATE_M;
 
 /// Smallest and largest support radius, m.
-const RADII_M: [f64; 2] = [1e-4, 1e4];
+pub(crate) const RADII_M: [f64; 2] = [1e-4, 1e4];
 
 /// The support radius h.
 #[derive(Debug, Clone, Copy)]
@@ -105,6 +105,16 @@ pub fn project(
         positions_m[sample as usize] = *at;
     }
     Ok(Outcome { positions_m, ..moved })
+}
+
+/// Weighted scatter of the points around every point about their mean (xx, xy, xz, yy, yz, zz in m²),
+/// with theta of the given radii as weights and `reach_ratio` as in [`Settings`].
+///
+/// The sums depend on the sequence of the points in their last bits: sort them first.
+pub(crate) fn scatters(points: &[[f64; 3]], h_m: &[f64], reach_ratio: f64) -> Vec<[f32; 6]> {
+    let cloud = Cloud::new(points.iter().copied().zip(h_m.iter().copied()));
+    let settings = Settings { mu: 0.0, iterations: 0, reach_ratio, still_ratio: 0.0 };
+    cloud.scatters(&settings)
 }
 
 fn check(

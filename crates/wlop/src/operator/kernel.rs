@@ -117,6 +117,36 @@ pub(super) fn mean_offset<const PULL: bool>(blocks: &[Block], target: &Target) -
     if sum > NO_NEIGHBOURS { [x, y, z].map(|axis| add_up(axis) / sum) } else { [0.0; 3] }
 }
 
+/// Weighted scatter of the neighbours about their mean: xx, xy, xz, yy, yz, zz in m², with theta as
+/// weights; nothing without neighbours.
+pub(super) fn scatter(blocks: &[Block], target: &Target) -> [f32; 6] {
+    let (mut sum, mut first, mut second) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 6]);
+    for block in blocks {
+        for lane in 0..LANES {
+            let (weight, [x, y, z], _) = theta(block, lane, target);
+            let (wx, wy, wz) = (weight * x, weight * y, weight * z);
+            sum[lane] += weight;
+            first[0][lane] += wx;
+            first[1][lane] += wy;
+            first[2][lane] += wz;
+            second[0][lane] += wx * x;
+            second[1][lane] += wx * y;
+            second[2][lane] += wx * z;
+            second[3][lane] += wy * y;
+            second[4][lane] += wy * z;
+            second[5][lane] += wz * z;
+        }
+    }
+    let sum = add_up(sum);
+    if sum <= NO_NEIGHBOURS {
+        return [0.0; 6];
+    }
+    let mean = first.map(|lanes| add_up(lanes) / sum);
+    let [xx, xy, xz, yy, yz, zz] = second.map(|lanes| add_up(lanes) / sum);
+    let [x, y, z] = mean;
+    [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

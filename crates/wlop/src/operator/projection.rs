@@ -1,7 +1,7 @@
 //! The iteration, and the passes over all pairs of neighbours that it is made of.
 
 use super::cells::{Around, CELL_SHARE, Cells, Walk};
-use super::kernel::{Block, Target, density, mean_offset};
+use super::kernel::{Block, Target, density, mean_offset, scatter};
 use super::{Outcome, Settings};
 use rayon::prelude::*;
 use std::ops::Range;
@@ -44,13 +44,27 @@ impl Cloud {
 
     /// 1 + the sum of theta over the other points, for every point: v of points, w of samples.
     fn densities(&self, settings: &Settings) -> Vec<f32> {
-        let mut all = vec![1.0; self.at.len()];
+        // A point is among its neighbours, with a theta of 1: the formula's 1.
+        self.each(settings, |blocks, target| density(blocks, target).max(1.0))
+    }
+
+    /// The weighted scatter of the points around every point, see [`scatter`].
+    pub(super) fn scatters(&self, settings: &Settings) -> Vec<[f32; 6]> {
+        self.each(settings, scatter)
+    }
+
+    /// A sum over the neighbours of every point.
+    fn each<T: Send + Copy + Default>(
+        &self,
+        settings: &Settings,
+        sum: impl Fn(&[Block], &Target) -> T + Sync,
+    ) -> Vec<T> {
+        let mut all = vec![T::default(); self.at.len()];
         for class in self.classes() {
             let cells = self.cells(class, settings);
             let pass = Pass { cloud: self, targets: &cells, class, settings };
-            // A point is among its neighbours, with a theta of 1: the formula's 1.
-            for (index, sum) in pass.over(&cells, density) {
-                all[index as usize] = sum.max(1.0);
+            for (index, value) in pass.over(&cells, &sum) {
+                all[index as usize] = value;
             }
         }
         all
