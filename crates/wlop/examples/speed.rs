@@ -18,7 +18,7 @@ fn main() {
     let kept: Vec<u32> = (0..n as u32).filter(|i| noise(u64::from(*i)*7+3) < share).collect();
     rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap().install(|| {
         let t = Instant::now();
-        let o = project(&pts, &kept, Radius::Everywhere(0.08), &Settings { mu: 0.45, iterations: 35, reach_ratio: 0.5, still_ratio: 0.0 }).unwrap();
+        let o = project(&pts, &kept, Radius::Everywhere(0.08), &Settings { weights: Weights::Even, mu: 0.45, iterations: 35, reach_ratio: 0.5, still_ratio: 0.0 }).unwrap();
         println!("{} {} {:.2} s", n, o.last_move_ratio, t.elapsed().as_secs_f64());
     });
     if let Some(p) = std::env::args().nth(3) {

@@ -9,15 +9,20 @@
 //! b_ii' = theta(|x_i - x_i'|)/|x_i - x_i'|  w_i = 1 + sum_i' theta(|x_i - x_i'|)
 //! ```
 //!
-//! The v_j are computed once, the w_i once an iteration. What the papers leave open:
+//! The v_j are computed once, the w_i once an iteration. These are [`Weights::Paper`]. With a = theta and
+//! b = theta/r² ([`Weights::Even`], as CGAL has them) the result is thinner and more even: on a plane of
+//! 4000 points with noise of 5.9 mm, half of them kept, 1.1 mm instead of 1.9 mm, and the distance to the
+//! nearest sample varies by less than 20 % instead of 77 % (`cargo test -p timberline-wlop operator`).
+//!
+//! What the papers leave open:
 //!
 //! * **Radii of one's own**: of two points with different h the smaller counts, h_ij = min(h_i, h_j).
 //!   That is symmetric, and keeps the points of a thin branch from being pulled by the thick one it
 //!   grows from.
 //! * **r = 0**, at duplicates and where a sample still lies on the point it was: r is softened to
 //!   sqrt(r² + (h/80)²) in a and b. Samples at one place stay together.
-//! * **The beginning**: the first iteration has a = theta and no second term, which is the first guess of
-//!   Lipman et al. 2007, section 3; with theta/r a sample would hardly leave the point it was taken from.
+//! * **The beginning**: with the paper's weights the first iteration has a = theta and no second term, the
+//!   first guess of Lipman et al. 2007; with theta/r a sample hardly leaves the point it was taken from.
 //! * **The end of theta**, which is never 0: pairs farther apart than `reach_ratio` h are left out.
 //! * **Nothing near**: a sample without neighbours stays where it is.
 //!
@@ -47,9 +52,20 @@ pub enum Radius<'a> {
     OfPoints(&'a [f64]),
 }
 
+/// What neighbours weigh.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Weights {
+    /// theta/r in both terms: Huang et al. 2009.
+    Paper,
+    /// theta in the first term and theta/r² in the second.
+    Even,
+}
+
 /// How the operator is applied.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Settings {
+    /// What neighbours weigh.
+    pub weights: Weights,
     /// Weight of the repulsion between samples, 0 to below 0.5 (Huang et al. 2009, section 3).
     pub mu: f64,
     /// Most iterations.
@@ -113,7 +129,8 @@ pub fn project(
 /// The sums depend on the sequence of the points in their last bits: sort them first.
 pub(crate) fn scatters(points: &[[f64; 3]], h_m: &[f64], reach_ratio: f64) -> Vec<[f32; 6]> {
     let cloud = Cloud::new(points.iter().copied().zip(h_m.iter().copied()));
-    let settings = Settings { mu: 0.0, iterations: 0, reach_ratio, still_ratio: 0.0 };
+    let weights = Weights::Even;
+    let settings = Settings { weights, mu: 0.0, iterations: 0, reach_ratio, still_ratio: 0.0 };
     cloud.scatters(&settings)
 }
 

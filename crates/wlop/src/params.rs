@@ -1,6 +1,6 @@
 //! Parameters of the stage.
 
-use crate::operator::Settings;
+use crate::operator::{Settings, Weights};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -22,8 +22,8 @@ pub struct ConsolidationParams {
     #[schemars(extend("x-source" = "Huang et al. 2009; Lipman et al. 2007"))]
     pub method: Method,
     /// As the paper does it: one radius h = 4 sqrt(d/m) for the stem and one for the rest (d: diagonal
-    /// of the bounding box, m: number of points), `share` of the points, all iterations, theta to its
-    /// end, and the result taken whatever it is. Of the fields below only `mu`, `share` and
+    /// of the bounding box, m: number of points), `share` of the points, all iterations, theta/r as weights and
+    /// theta to its end, and the result taken whatever it is. Of the fields below only `mu`, `share` and
     /// `min_points` are used.
     #[schemars(extend("x-source" = "Huang et al. 2009, section 3"))]
     pub paper: bool,
@@ -98,13 +98,14 @@ impl ConsolidationParams {
     pub fn settings(&self) -> Settings {
         /// Huang et al. 2009.
         const PAPER_ITERATIONS: u32 = 50;
+        let [mu, still_ratio] = [self.mu, self.still_ratio];
         if self.paper {
-            let iterations = PAPER_ITERATIONS;
-            return Settings { mu: self.mu, iterations, reach_ratio: 1.0, still_ratio: 0.0 };
+            let (weights, iterations) = (Weights::Paper, PAPER_ITERATIONS);
+            return Settings { weights, mu, iterations, reach_ratio: 1.0, still_ratio: 0.0 };
         }
         // Beyond h/2 theta is below exp(-4); CGAL ends it there, too.
-        let (iterations, still_ratio) = (self.iterations, self.still_ratio);
-        Settings { mu: self.mu, iterations, reach_ratio: 0.5, still_ratio }
+        let (weights, iterations) = (Weights::Even, self.iterations);
+        Settings { weights, mu, iterations, reach_ratio: 0.5, still_ratio }
     }
 
     /// What is wrong across fields or out of range, one sentence each; empty when nothing is.

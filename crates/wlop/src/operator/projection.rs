@@ -2,7 +2,7 @@
 
 use super::cells::{Around, CELL_SHARE, Cells, Walk};
 use super::kernel::{Block, Target, density, mean_offset, scatter};
-use super::{Outcome, Settings};
+use super::{Outcome, Settings, Weights};
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -109,26 +109,32 @@ impl<'a> Projection<'a> {
 
     /// How far each sample moves in one iteration, m.
     fn moves(&self, samples: &Cloud, first: bool) -> Vec<[f64; 3]> {
-        let settings = self.settings;
         let mut moves = vec![[0.0; 3]; samples.at.len()];
-        let weights = if first { Vec::new() } else { samples.densities(settings) };
+        let guess = first && self.settings.weights == Weights::Paper;
+        let weights = if guess { Vec::new() } else { samples.densities(self.settings) };
         for (class, points) in &self.classes {
-            let mut cells = samples.cells(*class, settings);
-            if !first {
-                cells.weigh(&weights);
-            }
-            let pass = Pass { cloud: samples, targets: &cells, class: *class, settings };
-            if first {
-                for (index, pull) in pass.over(points, mean_offset::<false>) {
+            let mut cells = samples.cells(*class, self.settings);
+            let class = *class;
+            if guess {
+                let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
+                for (index, pull) in pass.over(points, mean_offset::<0>) {
                     moves[index as usize] = pull.map(f64::from);
                 }
                 continue;
             }
-            let pulls = pass.over(points, mean_offset::<true>);
-            let to_others = pass.over(&cells, mean_offset::<true>);
+            cells.weigh(&weights);
+            let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
+            let (pulls, to_others) = match self.settings.weights {
+                Weights::Paper => {
+                    (pass.over(points, mean_offset::<1>), pass.over(&cells, mean_offset::<1>))
+                }
+                Weights::Even => {
+                    (pass.over(points, mean_offset::<0>), pass.over(&cells, mean_offset::<2>))
+                }
+            };
             for ((index, pull), (_, to)) in pulls.into_iter().zip(to_others) {
                 moves[index as usize] =
-                    [0, 1, 2].map(|k| f64::from(pull[k]) - settings.mu * f64::from(to[k]));
+                    [0, 1, 2].map(|k| f64::from(pull[k]) - self.settings.mu * f64::from(to[k]));
             }
         }
         moves
