@@ -171,7 +171,8 @@ impl Cloud {
             .collect();
         order.sort_unstable_by(|a, b| {
             let (p, q) = (all[a.1 as usize], all[b.1 as usize]);
-            let place = p[2].total_cmp(&q[2]).then(p[0].total_cmp(&q[0])).then(p[1].total_cmp(&q[1]));
+            let place =
+                p[2].total_cmp(&q[2]).then(p[0].total_cmp(&q[0])).then(p[1].total_cmp(&q[1]));
             a.0.cmp(&b.0).then(place).then(a.1.cmp(&b.1))
         });
         order.dedup_by(|a, b| all[a.1 as usize] == all[b.1 as usize]);
@@ -181,12 +182,17 @@ impl Cloud {
         Self { points, inputs, stem }
     }
 
-    fn consolidate(&self, params: &ConsolidationParams, done: &mut Consolidated) -> Result<(), Error> {
+    fn consolidate(
+        &self,
+        params: &ConsolidationParams,
+        done: &mut Consolidated,
+    ) -> Result<(), Error> {
         let radii = radii(&self.points, params)?;
         let could = radii.h_m.iter().filter(|h| **h > 0.0).count();
         let share = could as f64 / self.points.len() as f64;
         if share < FEWEST_MOVED && !params.paper {
-            let [spacing_m, branch_m] = [&radii.spacing_m, &radii.branch_m].map(|v| median(v.clone()));
+            let [spacing_m, branch_m] =
+                [&radii.spacing_m, &radii.branch_m].map(|v| median(v.clone()));
             done.skipped = Some(Skipped::Sparse { share, spacing_m, branch_m });
             return Ok(());
         }

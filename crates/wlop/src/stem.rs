@@ -59,7 +59,9 @@ pub fn stem_points(points: &[[f64; 3]], base_m: [f64; 3], dbh_m: Option<f64>) ->
             break;
         }
         let most_m = BELONGS.0 * axis.radius_m + BELONGS.1;
-        members().filter(|&i| distance_m(points[i], axis) <= most_m).for_each(|i| is_stem[i] = true);
+        members()
+            .filter(|&i| distance_m(points[i], axis) <= most_m)
+            .for_each(|i| is_stem[i] = true);
     }
     is_stem
 }

@@ -110,7 +110,8 @@ mod tests {
     fn roughness_and_distance_are_found_on_a_cylinder() {
         let cloud = rough_cylinder(0.001);
         let origins: Vec<u32> = (0..5000).collect();
-        let queries = [0.05, 0.054].map(|x| Query { at_m: [x, 0.0, 0.5], radius_m: 0.02, origin: 9999 });
+        let queries =
+            [0.05, 0.054].map(|x| Query { at_m: [x, 0.0, 0.5], radius_m: 0.02, origin: 9999 });
         let found = measure(&cloud, &origins, &queries).unwrap();
         let [on, off] = [found[0].unwrap(), found[1].unwrap()];
         assert!((on.thickness_m / 1.4826 - 0.001).abs() < 3e-4, "{on:?}");
@@ -127,6 +128,8 @@ mod tests {
         assert!(found[1].is_none_or(|f| f.distance_m < 1e-9));
         let heap = vec![[0.1; 3]; 30];
         let at = Query { at_m: [0.1; 3], radius_m: 0.1, origin: 99 };
-        assert!(measure(&heap, &origins[..30], &[at]).unwrap()[0].is_none_or(|f| f.distance_m < 1e-9));
+        assert!(
+            measure(&heap, &origins[..30], &[at]).unwrap()[0].is_none_or(|f| f.distance_m < 1e-9)
+        );
     }
 }

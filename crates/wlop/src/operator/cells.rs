@@ -149,7 +149,11 @@ impl<'a> Walk<'a> {
                 row += 1;
                 let source = self.source;
                 let cells = source.keys[first..].iter().take_while(|key| **key <= last).count();
-                self.take(source.starts[first] as usize..source.starts[first + cells] as usize, middle, around);
+                self.take(
+                    source.starts[first] as usize..source.starts[first + cells] as usize,
+                    middle,
+                    around,
+                );
             }
         }
         self.finish()

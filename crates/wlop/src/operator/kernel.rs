@@ -98,8 +98,12 @@ pub(super) fn density(blocks: &[Block], target: &Target) -> f32 {
 }
 
 /// The weighted mean of the offsets to the neighbours, m; nothing without neighbours. Weights are
-/// theta / r to the power of `POWER`: 0, 1 or 2.
-pub(super) fn mean_offset<const POWER: u32>(blocks: &[Block], target: &Target) -> [f32; 3] {
+/// theta / r to the power of `POWER`: 0, 1 or 2. Of `OTHERS` what lies at the very place of the target,
+/// like itself, has no weight.
+pub(super) fn mean_offset<const POWER: u32, const OTHERS: bool>(
+    blocks: &[Block],
+    target: &Target,
+) -> [f32; 3] {
     let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
     let mut sum = [0.0; LANES];
     let softening = SOFTENING / target.narrowness;
@@ -111,6 +115,7 @@ pub(super) fn mean_offset<const POWER: u32>(blocks: &[Block], target: &Target) -
                 1 => theta / (squared + softening).sqrt(),
                 _ => theta / (squared + softening),
             };
+            let weight = if OTHERS && squared == 0.0 { 0.0 } else { weight };
             sum[lane] += weight;
             x[lane] += weight * offset[0];
             y[lane] += weight * offset[1];

@@ -117,7 +117,7 @@ impl<'a> Projection<'a> {
             let class = *class;
             if guess {
                 let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
-                for (index, pull) in pass.over(points, mean_offset::<0>) {
+                for (index, pull) in pass.over(points, mean_offset::<0, false>) {
                     moves[index as usize] = pull.map(f64::from);
                 }
                 continue;
@@ -125,12 +125,14 @@ impl<'a> Projection<'a> {
             cells.weigh(&weights);
             let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
             let (pulls, to_others) = match self.settings.weights {
-                Weights::Paper => {
-                    (pass.over(points, mean_offset::<1>), pass.over(&cells, mean_offset::<1>))
-                }
-                Weights::Even => {
-                    (pass.over(points, mean_offset::<0>), pass.over(&cells, mean_offset::<2>))
-                }
+                Weights::Paper => (
+                    pass.over(points, mean_offset::<1, false>),
+                    pass.over(&cells, mean_offset::<1, true>),
+                ),
+                Weights::Even => (
+                    pass.over(points, mean_offset::<0, false>),
+                    pass.over(&cells, mean_offset::<2, true>),
+                ),
             };
             for ((index, pull), (_, to)) in pulls.into_iter().zip(to_others) {
                 moves[index as usize] =
@@ -205,8 +207,7 @@ impl Pass<'_> {
 fn around(targets: &[(u32, Target)]) -> Around {
     /// So that rounding leaves out none that counts.
     const A_LITTLE_MORE: f32 = 1.0001;
-    let mut around =
-        Around { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], reach_m: 0.0 };
+    let mut around = Around { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], reach_m: 0.0 };
     for (_, target) in targets {
         for axis in 0..3 {
             around.low[axis] = around.low[axis].min(target.at[axis]);
