@@ -60,7 +60,7 @@ pub enum Error {
 pub(crate) fn check_positions(points: &[[f64; 3]], most_m: f64) -> Result<(), Error> {
     for (index, point) in points.iter().enumerate() {
         for (axis, &value) in ['x', 'y', 'z'].into_iter().zip(point) {
-            if !(value.abs() <= most_m) {
+            if !value.is_finite() || value.abs() > most_m {
                 return Err(Error::Position { index, axis, value, most_m });
             }
         }

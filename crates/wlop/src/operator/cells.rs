@@ -189,7 +189,7 @@ impl<'a> Walk<'a> {
         if self.blocks.len() < used {
             self.blocks.resize(used, Block::EMPTY);
         }
-        if self.len % LANES > 0 {
+        if !self.len.is_multiple_of(LANES) {
             let block = &mut self.blocks[used - 1];
             for lane in self.len % LANES..LANES {
                 block.weight[lane] = 0.0;
