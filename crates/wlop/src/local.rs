@@ -10,7 +10,7 @@ use timberline_pointcloud::Nearest3;
 const NEIGHBOURS: usize = 8;
 
 /// Spacing of points around every point, m: the edge of the square that each would have on a
-/// surface, from the area of the circle that holds the [`NEIGHBOURS`] nearest; the median over
+/// surface, from the area of the circle that holds the eight nearest; the median over
 /// these. Points must be distinct; 0 for a single one.
 ///
 /// # Errors
