@@ -22,6 +22,7 @@ mod architecture {
         "segmentation",
         "crowns",
         "stems",
+        "wlop",
         "export",
         "report",
         "evaluate",

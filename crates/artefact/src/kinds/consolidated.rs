@@ -27,15 +27,21 @@ pub struct Consolidated {
 pub struct Consolidation {
     /// Why it was skipped, if it was.
     pub skipped: Option<String>,
-    /// Points before.
+    /// Distinct points before.
     pub points_before: u64,
     /// Points after.
     pub points_after: u64,
-    /// Median thickness of the cloud across its local surface before, m.
+    /// Points among these that lie where they lay.
+    pub points_left_alone: u64,
+    /// Median thickness of the cloud across its local surface before, m. This and what follows is 0
+    /// where the tree was skipped before it was measured.
     pub thickness_before_m: f64,
     /// The same after, m.
     pub thickness_after_m: f64,
-    /// Mean distance from a point before to the surface through the points after, m.
+    /// Mean distance from a point before to the surface through the other points before, m.
+    pub distance_before_m: f64,
+    /// Mean distance from a point before to the surface through the points after, m: not above the
+    /// former where consolidation did no harm.
     pub mean_shift_m: f64,
 }
 
