@@ -7,7 +7,7 @@ use super::section::Shape;
 use crate::cloud::Cloud;
 use crate::model::{Node, Skeleton};
 use crate::paths::NONE;
-use crate::radii::{Seen, pipe_radii};
+use crate::radii::{Seen, allometric_radii};
 use crate::vector::{Vector, add, dot, scale, sub, unit};
 use crate::{SkeletonParams, base};
 
@@ -59,7 +59,7 @@ pub(crate) fn assemble(
         smooth(&mut line.at, params.smoothing);
         put(&mut made, &line, branch, from.map(|from| from.0), params.simplify);
     }
-    pipe_radii(&mut made.nodes, &made.seen, fallback_radius(cloud));
+    allometric_radii(&mut made.nodes, &made.seen, fallback_radius(cloud));
     for node in &mut made.nodes {
         node.position_m = cloud.to_given(node.position_m);
     }

@@ -109,7 +109,7 @@ pub(crate) fn prune(
         let (parent, fork) = (branches[own].parent as usize, branches[own].fork);
         let points = all_points(&branches[own], grown);
         let worth = explained(&points, &branches[parent], fork, grown, cloud, spacing_m);
-        let enough = points.len() as f64 >= FEWEST_POINTS / detail.min(2.0);
+        let enough = points.len() as f64 >= FEWEST_POINTS / detail;
         kept[own] = carries[own] || (enough && worth >= EXPLAINED_SPACINGS / detail);
         if kept[own] {
             carries[parent] = true;

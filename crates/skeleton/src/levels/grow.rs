@@ -7,12 +7,12 @@ use crate::paths::{NONE, Paths};
 use crate::vector::{Vector, distance};
 
 /// Length of a section in spacings, and in radii of the section below: the longer of the two.
-const LENGTH_SPACINGS: f64 = 2.5;
+const LENGTH_SPACINGS: f64 = 1.5;
 const LENGTH_RADII: f64 = 1.0;
 
 /// Points of a section are parted where a gap is wider than this many spacings and radii.
-const GAP_SPACINGS: f64 = 2.0;
-const GAP_RADII: f64 = 0.6;
+const GAP_SPACINGS: f64 = 1.2;
+const GAP_RADII: f64 = 0.9;
 
 /// The tree of sections over the points.
 #[derive(Debug, Default)]
@@ -42,6 +42,8 @@ pub(crate) struct Ground<'a> {
     pub(crate) first_radius_m: f64,
     /// Length of the first section, m.
     pub(crate) first_length_m: f64,
+    /// Factor on lengths and gaps in spacings: below 1 for more detail.
+    pub(crate) fineness: f64,
 }
 
 /// The points after each on the paths from the base.
@@ -100,10 +102,10 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
     let length = |&p: &u32| ground.length_m[p as usize];
     let below = grown.sections.get(front.parent as usize).map(|section| section.shape);
     let spacing = mean_spacing(ground, &front.seeds);
-    let radius = below.map_or(ground.first_radius_m, |below| below.radius);
+    let radius = below.map_or(ground.first_radius_m, |below| below.reach);
     let step = match below {
         None => ground.first_length_m,
-        Some(_) => (LENGTH_SPACINGS * spacing).max(LENGTH_RADII * radius),
+        Some(_) => (LENGTH_SPACINGS * ground.fineness * spacing).max(LENGTH_RADII * radius),
     };
     let first = front.seeds.iter().map(length).fold(f64::INFINITY, f64::min);
     // Seeds beyond the whole next section come over a gap: they begin at their own distance.
@@ -122,7 +124,7 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
     }
     let gap = match below {
         None => f64::INFINITY,
-        Some(_) => (GAP_SPACINGS * spacing).max(GAP_RADII * radius),
+        Some(_) => (GAP_SPACINGS * ground.fineness * spacing).max(GAP_RADII * radius),
     };
     for group in clusters(&ground.cloud.points, taken, gap) {
         let above = group.iter().flat_map(|&point| ground.upwards.of(point));

@@ -29,6 +29,9 @@ const SPACING_RANK: usize = 4;
 /// The first section is this share of the tree's height.
 const FIRST_SHARE: f64 = 0.02;
 
+/// Sections are made shorter by at most this factor for more detail.
+const FINEST: f64 = 0.4;
+
 /// How much costlier an edge to leaves is.
 const LEAF_COST: f64 = 3.0;
 
@@ -89,6 +92,7 @@ fn build(
         length_m: &length_m,
         upwards: &upwards,
         first_radius_m: base::first_radius_m(cloud, &sources),
+        fineness: (1.0 / params.detail.max(1.0).sqrt()).max(FINEST),
         first_length_m: (FIRST_SHARE * (high - low)).max(2.0 * median(spacing_m)),
     };
     let grown = grow::grow(&ground, sources);

@@ -9,8 +9,8 @@ use crate::vector::{Vector, distance};
 /// point vary by that much.
 const ALWAYS_SPACINGS: f64 = 8.0;
 
-/// Pieces with less than this share of the largest one's points do not hold the base.
-const BASE_SHARE: f64 = 0.05;
+/// Smaller pieces do not hold the base unless all are small: echoes of nothing lie below the ground.
+const BASE_POINTS: u32 = 10;
 
 /// The pieces of a cloud.
 #[derive(Debug)]
@@ -49,7 +49,7 @@ impl Pieces {
     pub(crate) fn may_hold_base(&self, point: u32) -> bool {
         let largest = self.points.iter().max().copied().unwrap_or(0);
         let own = self.points[self.of[point as usize] as usize];
-        f64::from(own) >= BASE_SHARE * f64::from(largest)
+        own >= BASE_POINTS.min(largest)
     }
 
     /// Bridges the pieces from the one that holds the base outwards. A bridge is cut when it is

@@ -24,6 +24,10 @@ pub(crate) struct Shape {
     pub(crate) radius: f64,
     /// Whether centre and radius are those of a circle.
     pub(crate) round: bool,
+    /// Radius that the next section is cut and parted by, m: where no circle is seen, it falls.
+    pub(crate) reach: f64,
+    /// Radius of the last circle on the way from the base, m; of none, the first section's.
+    pub(crate) last_round: f64,
     /// Mean distance to the fourth neighbour, m.
     pub(crate) spacing: f64,
 }
@@ -39,6 +43,10 @@ const CIRCLE_SPREAD: f64 = 0.25;
 
 /// How much thicker than the section below a section may be: stems swell below whorls.
 const SWELL: f64 = 1.15;
+
+/// How much smaller [`Shape::reach`] is after a section without a circle: above the last fork that
+/// shows as one, branches are thinner than their clumps of points.
+const FALL: f64 = 0.85;
 
 /// Share of its own points that the radius below counts as in a circle.
 const PRIOR_SHARE: f64 = 0.1;
@@ -62,17 +70,21 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first_radius: 
             unit(add(step, below.along)).unwrap_or(step)
         }
     };
-    let most = below.map_or(first_radius, |below| SWELL * below.radius);
+    let most = below.map_or(first_radius, |below| SWELL * below.last_round);
     let spacing = members.spacing;
     if let Some((centre, radius)) = round(members, middle, along, below, most) {
-        return Shape { centre, along, radius, round: true, spacing };
+        let (round, reach, last_round) = (true, radius, radius);
+        return Shape { centre, along, radius, round, reach, last_round, spacing };
     }
     let away = |p: &Vector| {
         let out = sub(*p, middle);
         norm(sub(out, scale(along, dot(out, along))))
     };
     let radius = members.points.iter().map(away).sum::<f64>() / members.points.len() as f64;
-    Shape { centre: middle, along, radius: radius.min(most), round: false, spacing }
+    let radius = radius.min(most);
+    let reach = below.map_or(radius, |below| radius.min(FALL * below.reach));
+    let last_round = below.map_or(first_radius, |below| below.last_round);
+    Shape { centre: middle, along, radius, round: false, reach, last_round, spacing }
 }
 
 fn weighted_mean(members: &Members<'_>) -> Vector {
