@@ -11,12 +11,12 @@ pub(crate) struct Circle {
     pub(crate) spread: f64,
 }
 
-/// What is known before the points are looked at: the radius of the section below.
+/// What is known before the points are looked at: a radius and its standard deviation, m. An arc
+/// long enough for its noise overrules it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prior {
     pub(crate) radius: f64,
-    /// Its weight, in points.
-    pub(crate) weight: f64,
+    pub(crate) deviation: f64,
 }
 
 /// Rounds of reweighting: changes are far below the noise after that many.
@@ -89,8 +89,9 @@ fn step(points: &[[f64; 2]], at: &Circle, prior: Option<Prior>) -> Option<Circle
         right += row * (residual * weight);
     }
     if let Some(prior) = prior {
-        matrix[(2, 2)] += prior.weight;
-        right[2] += prior.weight * (prior.radius - at.radius);
+        let ratio = (MAD * at.spread / prior.deviation).max(1e-6);
+        matrix[(2, 2)] += ratio * ratio;
+        right[2] += ratio * ratio * (prior.radius - at.radius);
     }
     let by: [f64; 3] = matrix.cholesky()?.solve(&right).into();
     let centre = [at.centre[0] + by[0], at.centre[1] + by[1]];
@@ -128,7 +129,7 @@ mod tests {
         assert!((whole.radius - 0.15).abs() < 0.001 && whole.spread < 0.003, "{whole:?}");
         let mut third = arc(0.3, 2.4, 0.003);
         third.extend([[3.4, -2.3], [2.6, -1.5], [3.1, -1.4]]);
-        let prior = Prior { radius: 0.16, weight: 3.0 };
+        let prior = Prior { radius: 0.16, deviation: 0.04 };
         let part = fit(&third, Some(prior)).unwrap();
         assert!((part.radius - 0.15).abs() < 0.01, "{part:?}");
         assert!((part.centre[0] - 3.0).abs() < 0.01 && (part.centre[1] + 2.0).abs() < 0.01);

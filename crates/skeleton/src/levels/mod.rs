@@ -97,6 +97,7 @@ fn build(
     };
     let grown = grow::grow(&ground, sources);
     let mut branches = branches::string(&grown);
+    if std::env::var("DBG").is_ok() { for &b in branches[0].sections.iter().take(60) { let x=&grown.sections[b as usize]; eprintln!("n {:4} z {:.2} xy {:.3} {:.3} r {:.3} reach {:.3} last {:.3} round {} spacing {:.3}", x.end-x.start, x.shape.centre[2], x.shape.centre[0], x.shape.centre[1], x.shape.radius, x.shape.reach, x.shape.last.radius, x.shape.round, x.shape.spacing);} }
     let kept = branches::prune(&mut branches, &grown, cloud, spacing_m, params.detail);
     assemble::assemble(cloud, &grown, &branches, &kept, base_m, params)
 }
@@ -151,3 +152,4 @@ pub(crate) fn median(values: &[f64]) -> f64 {
     }
     *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
+// DEBUG
