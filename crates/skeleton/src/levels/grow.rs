@@ -7,11 +7,11 @@ use crate::paths::{NONE, Paths};
 use crate::vector::{Vector, distance};
 
 /// Length of a section in spacings, and in radii of the section below: the longer of the two.
-const LENGTH_SPACINGS: f64 = 1.5;
+const LENGTH_SPACINGS: f64 = 0.75;
 const LENGTH_RADII: f64 = 1.0;
 
 /// Points of a section are parted where a gap is wider than this many spacings and radii.
-const GAP_SPACINGS: f64 = 1.2;
+const GAP_SPACINGS: f64 = 0.6;
 const GAP_RADII: f64 = 0.9;
 
 /// The tree of sections over the points.
@@ -42,7 +42,7 @@ pub(crate) struct Ground<'a> {
     pub(crate) first_radius_m: f64,
     /// Length of the first section, m.
     pub(crate) first_length_m: f64,
-    /// Factor on lengths and gaps in spacings: below 1 for more detail.
+    /// Factor on lengths and gaps that are told in spacings: below 1 for more detail.
     pub(crate) fineness: f64,
 }
 

@@ -29,8 +29,8 @@ const SPACING_RANK: usize = 4;
 /// The first section is this share of the tree's height.
 const FIRST_SHARE: f64 = 0.02;
 
-/// Sections are made shorter by at most this factor for more detail.
-const FINEST: f64 = 0.4;
+/// Factors by which sections are at most longer and shorter for less and more detail.
+const FINENESS: (f64, f64) = (0.7, 2.0);
 
 /// How much costlier an edge to leaves is.
 const LEAF_COST: f64 = 3.0;
@@ -92,12 +92,11 @@ fn build(
         length_m: &length_m,
         upwards: &upwards,
         first_radius_m: base::first_radius_m(cloud, &sources),
-        fineness: (1.0 / params.detail.max(1.0).sqrt()).max(FINEST),
+        fineness: (1.0 / params.detail.sqrt()).clamp(FINENESS.0, FINENESS.1),
         first_length_m: (FIRST_SHARE * (high - low)).max(2.0 * median(spacing_m)),
     };
     let grown = grow::grow(&ground, sources);
     let mut branches = branches::string(&grown);
-    if std::env::var("DBG").is_ok() { for &b in branches[0].sections.iter().take(60) { let x=&grown.sections[b as usize]; eprintln!("n {:4} z {:.2} xy {:.3} {:.3} r {:.3} reach {:.3} last {:.3} round {} spacing {:.3}", x.end-x.start, x.shape.centre[2], x.shape.centre[0], x.shape.centre[1], x.shape.radius, x.shape.reach, x.shape.last.radius, x.shape.round, x.shape.spacing);} }
     let kept = branches::prune(&mut branches, &grown, cloud, spacing_m, params.detail);
     assemble::assemble(cloud, &grown, &branches, &kept, base_m, params)
 }
@@ -152,4 +151,3 @@ pub(crate) fn median(values: &[f64]) -> f64 {
     }
     *sorted.select_nth_unstable_by(middle, f64::total_cmp).1
 }
-// DEBUG

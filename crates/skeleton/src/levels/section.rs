@@ -62,12 +62,12 @@ const CIRCLE_SPREAD: f64 = 0.25;
 const SWELL: f64 = 1.5;
 
 /// How much thicker than by the pipe model a circle may be, and a section without a circle.
-const ROUND_ABOVE_PIPE: f64 = 2.0;
-const ABOVE_PIPE: f64 = 1.3;
+const ROUND_ABOVE_PIPE: f64 = 1.8;
+const ABOVE_PIPE: f64 = 1.15;
 
 /// Share of the reach below that a section without a circle keeps: one bad section of a stem must
 /// not part those above it.
-const HOLD: f64 = 0.9;
+const HOLD: f64 = 0.8;
 
 /// Standard deviation of a radius from what the pipe model makes of the last circle, relative.
 const PRIOR_DEVIATION: f64 = 0.25;
@@ -159,7 +159,6 @@ fn accept(
 ) -> Option<(Vector, f64)> {
     let off = add(scale(u, circle.centre[0]), scale(v, circle.centre[1]));
     let centre = add(middle, off);
-    let flatn = members.points.len();
     let thick = circle.radius >= CIRCLE_SPACINGS * members.spacing;
     let thin_wall = circle.spread <= CIRCLE_SPREAD * circle.radius;
     let inside = norm(off) <= 1.2 * circle.radius;
@@ -169,7 +168,6 @@ fn accept(
         let sideways = sub(step, scale(below.along, dot(step, below.along)));
         norm(sideways) <= (0.7 * below.last.radius).max(0.4 * norm(step))
     });
-    if std::env::var("DBG2").is_ok() && flatn > 20 { eprintln!("n {} z {:.2} circle r {:.3} spread {:.4} off {:.3} most {:.3} thick {thick} wall {thin_wall} inside {inside} near {near_axis}", flatn, middle[2], circle.radius, circle.spread, norm(off), most); }
     let good = thick && thin_wall && inside && near_axis && circle.radius <= most;
     good.then_some((centre, circle.radius))
 }
