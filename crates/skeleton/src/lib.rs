@@ -36,6 +36,7 @@ pub mod model;
 pub mod params;
 pub mod paths;
 mod radii;
+pub mod stage;
 mod vector;
 
 pub use error::Error;
