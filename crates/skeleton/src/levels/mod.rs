@@ -48,7 +48,7 @@ pub(crate) fn skeleton(
     let graph = near.graph();
     let pieces = Pieces::new(&tree, &cloud.points, &graph);
     drop(tree);
-    let root = base::root(cloud, base_m, |point| pieces.may_hold_base(point));
+    let root = base::root(&cloud.points, base_m, |point| pieces.may_hold_base(point));
     let joined = pieces.join(root, spacing_m, params.gap_m);
     let graph = graph.with(&joined.bridges);
     let sources = sources(cloud, &graph, root, spacing_m);
@@ -91,7 +91,7 @@ fn build(
         spacing_m,
         length_m: &length_m,
         upwards: &upwards,
-        first_radius_m: base::first_radius_m(cloud, &sources),
+        first_radius_m: base::first_radius_m(&cloud.points, &sources),
         fineness: (1.0 / params.detail.sqrt()).clamp(FINENESS.0, FINENESS.1),
         first_length_m: (FIRST_SHARE * (high - low)).max(2.0 * median(spacing_m)),
     };
