@@ -93,7 +93,7 @@ mod tests {
                 [0.1 * libm::cos(angle), 0.1 * libm::sin(angle), f64::from(i) * 0.001]
             })
             .collect();
-        let centred = centre(&points, 0, 0.2);
+        let centred = centre(&points, 0, 0.3);
         let radius = |p: &Vector| (p[0] * p[0] + p[1] * p[1]).sqrt();
         let mean_of = |from: usize, to: usize| {
             centred[from..to].iter().map(radius).sum::<f64>() / (to - from) as f64

@@ -7,7 +7,7 @@ use crate::graph::knn::Neighbours;
 use crate::kdtree::KdTree;
 use crate::levels::median;
 use crate::model::GraphKind;
-use crate::paths::{NONE, shortest};
+use crate::paths::shortest;
 use crate::vector::{Vector, squared};
 use crate::{Edges, SkeletonParams, Tree};
 
@@ -92,7 +92,7 @@ impl Spanned {
     #[cfg(test)]
     fn is_whole(&self) -> bool {
         self.order.len() == self.parent.len()
-            && self.parent.iter().filter(|&&parent| parent == NONE).count() == 1
+            && self.parent.iter().filter(|&&parent| parent == crate::paths::NONE).count() == 1
     }
 }
 

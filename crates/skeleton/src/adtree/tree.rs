@@ -78,7 +78,7 @@ impl Tree {
 
     /// Leaves out subtrees with little length; their points go to where they hung.
     pub(super) fn leave_out_small(&mut self) {
-        let length = self.longest();
+        let length = self.lengths(|sum, own| sum + own);
         for v in self.order() {
             if !self.alive[v as usize] {
                 continue;
