@@ -62,29 +62,34 @@ impl Neighbours {
     /// The graph with an edge where one point is among the neighbours of the other.
     #[must_use]
     pub fn graph(&self) -> Graph {
+        self.graph_of(|_, _| true)
+    }
+
+    /// The same with those edges only that hold a condition, which must not depend on direction.
+    pub(crate) fn graph_of(&self, holds: impl Fn(u32, u32) -> bool) -> Graph {
         let len = self.spacing_m.len();
-        let one_way = |a: u32, b: u32| !self.of(b).contains(&a);
         let mut start = vec![0u32; len + 1];
-        for a in 0..len as u32 {
-            start[a as usize + 1] += self.each as u32;
-            self.of(a).iter().filter(|&&b| one_way(a, b)).for_each(|&b| start[b as usize + 1] += 1);
-        }
+        self.each_way(&holds, |a, _| start[a as usize + 1] += 1);
         add_up(&mut start);
         let mut to = vec![0; start[len] as usize];
         let mut next = start.clone();
-        let mut put = |a: u32, b: u32| {
+        self.each_way(&holds, |a, b| {
             to[next[a as usize] as usize] = b;
             next[a as usize] += 1;
-        };
-        for a in 0..len as u32 {
-            for &b in self.of(a) {
-                put(a, b);
-                if one_way(a, b) {
-                    put(b, a);
+        });
+        Graph { start, to }
+    }
+
+    /// Calls back with both directions of every edge, each once.
+    fn each_way(&self, holds: impl Fn(u32, u32) -> bool, mut found: impl FnMut(u32, u32)) {
+        for a in 0..self.spacing_m.len() as u32 {
+            for &b in self.of(a).iter().filter(|&&b| holds(a, b)) {
+                found(a, b);
+                if !self.of(b).contains(&a) {
+                    found(b, a);
                 }
             }
         }
-        Graph { start, to }
     }
 }
 

@@ -21,7 +21,7 @@ use crate::paths::{Paths, shortest};
 use crate::vector::{Vector, distance};
 use crate::{SkeletonParams, base};
 use grow::{Ground, Upwards};
-use pieces::Pieces;
+use pieces::{Gaps, Pieces};
 
 /// Rank of the neighbour whose distance is the spacing at a point.
 const SPACING_RANK: usize = 4;
@@ -45,11 +45,13 @@ pub(crate) fn skeleton(
     let tree = KdTree::new(&cloud.points);
     let near = Neighbours::by(&tree, &cloud.points, params.neighbours as usize, SPACING_RANK);
     let spacing_m = median(&near.spacing_m);
-    let graph = near.graph();
+    let gaps =
+        Gaps { spacing_m: &near.spacing_m, median_m: spacing_m, gap_m: params.gap_m };
+    let graph = gaps.close(&near, &cloud.points);
     let pieces = Pieces::new(&tree, &cloud.points, &graph);
     drop(tree);
     let root = base::root(&cloud.points, base_m, |point| pieces.may_hold_base(point));
-    let joined = pieces.join(root, spacing_m, params.gap_m);
+    let joined = pieces.join(root, &gaps);
     let graph = graph.with(&joined.bridges);
     let sources = sources(cloud, &graph, root, spacing_m);
     let paths = paths(cloud, &graph, &near.spacing_m, &sources);

@@ -2,15 +2,45 @@
 
 use crate::graph::Graph;
 use crate::graph::emst::{Link, bridges};
+use crate::graph::knn::Neighbours;
 use crate::kdtree::KdTree;
-use crate::vector::{Vector, distance};
+use crate::vector::{Vector, distance, squared};
 
 /// Gaps up to this many median spacings are always bridged: within a twig, distances to the next
 /// point vary by that much.
 const ALWAYS_SPACINGS: f64 = 8.0;
 
+/// So are gaps up to this many spacings of the points around: crowns are seen less densely than stems.
+const ALWAYS_AROUND: f64 = 3.0;
+
 /// Smaller pieces do not hold the base unless all are small: echoes of nothing lie below the ground.
 const BASE_POINTS: u32 = 10;
+
+/// How wide gaps may be.
+#[derive(Debug)]
+pub(crate) struct Gaps<'a> {
+    pub(crate) spacing_m: &'a [f64],
+    pub(crate) median_m: f64,
+    /// Widest gap to a piece of the same size.
+    pub(crate) gap_m: f64,
+}
+
+impl Gaps<'_> {
+    /// Squared length up to which an edge from a point is no gap, m².
+    fn always_m2(&self, from: u32) -> f64 {
+        let around = ALWAYS_AROUND * self.spacing_m[from as usize];
+        let always = around.max(ALWAYS_SPACINGS * self.median_m);
+        always * always
+    }
+
+    /// The neighbour graph without edges that are gaps seen from either end.
+    pub(crate) fn close(&self, near: &Neighbours, points: &[Vector]) -> Graph {
+        near.graph_of(|a, b| {
+            let length = squared(points[a as usize], points[b as usize]);
+            length <= self.always_m2(a).min(self.always_m2(b))
+        })
+    }
+}
 
 /// The pieces of a cloud.
 #[derive(Debug)]
@@ -53,8 +83,9 @@ impl Pieces {
     }
 
     /// Bridges the pieces from the one that holds the base outwards. A bridge is cut when it is
-    /// longer than some spacings and than `gap_m`, or than what lies beyond it.
-    pub(crate) fn join(&self, base: u32, spacing_m: f64, gap_m: f64) -> Joined {
+    /// longer than some spacings of the points it leaves, and longer than the widest gap or than what
+    /// lies beyond it.
+    pub(crate) fn join(&self, base: u32, gaps: &Gaps<'_>) -> Joined {
         let order = self.outwards(self.of[base as usize]);
         let mut beyond = self.bounds.clone();
         for &(piece, parent, _) in order.iter().rev() {
@@ -64,9 +95,11 @@ impl Pieces {
         let mut joined = Joined { bridges: Vec::new(), cut: 0 };
         for &(piece, parent, link) in &order {
             let (low, high) = beyond[piece as usize];
-            let allowed = gap_m.min(distance(low, high)).max(ALWAYS_SPACINGS * spacing_m);
             let link = &self.links[link];
-            let short = link.squared_m2 <= allowed * allowed;
+            let [a, b] = link.ends;
+            let from = if self.of[a as usize] == parent { a } else { b };
+            let size = gaps.gap_m.min(distance(low, high));
+            let short = link.squared_m2 <= gaps.always_m2(from).max(size * size);
             kept[piece as usize] = short && kept[parent as usize];
             if kept[piece as usize] {
                 joined.bridges.push(link.ends);
