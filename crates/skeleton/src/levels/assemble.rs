@@ -1,7 +1,7 @@
 //! Branches made into nodes.
 
 use super::axis::{even_out, simplify, smooth};
-use super::branches::Branch;
+use super::branches::{Branch, Pruning};
 use super::grow::Grown;
 use super::section::Shape;
 use crate::cloud::Cloud;
@@ -38,13 +38,13 @@ struct Made {
 
 /// Makes the skeleton of the branches that are kept.
 pub(crate) fn assemble(
-    cloud: &Cloud,
-    grown: &Grown,
+    pruning: &Pruning<'_>,
     branches: &[Branch],
     kept: &[bool],
     base_m: Option<Vector>,
     params: &SkeletonParams,
 ) -> Skeleton {
+    let (cloud, grown) = (pruning.cloud, pruning.grown);
     let mut forks = vec![false; grown.sections.len()];
     for (branch, _) in branches.iter().zip(kept).skip(1).filter(|(_, kept)| **kept) {
         forks[fork_of(branches, branch) as usize] = true;
@@ -55,7 +55,7 @@ pub(crate) fn assemble(
             let node = made.of_section[fork_of(branches, branch) as usize];
             (node, made.nodes[node as usize].position_m)
         });
-        let mut line = line(cloud, grown, branch, &forks, from.map(|from| from.1), base_m);
+        let mut line = line(pruning, branch, &forks, from.map(|from| from.1), base_m);
         smooth(&mut line.at, params.smoothing);
         put(&mut made, &line, branch, from.map(|from| from.0), params.simplify);
     }
@@ -76,15 +76,16 @@ fn fallback_radius(cloud: &Cloud) -> f64 {
 }
 
 fn line(
-    cloud: &Cloud,
-    grown: &Grown,
+    pruning: &Pruning<'_>,
     branch: &Branch,
     forks: &[bool],
     from: Option<Vector>,
     base_m: Option<Vector>,
 ) -> Line {
+    let (cloud, grown) = (pruning.cloud, pruning.grown);
     let section = |&s: &u32| &grown.sections[s as usize];
-    let shapes: Vec<Shape> = branch.sections.iter().map(|s| section(s).shape).collect();
+    let mut shapes: Vec<Shape> = branch.sections.iter().map(|s| section(s).shape).collect();
+    pruning.take_in(branch, &mut shapes);
     let centres = even_out(&shapes);
     let count = |&p: &u32| cloud.count[p as usize];
     let mut points: Vec<u32> = branch

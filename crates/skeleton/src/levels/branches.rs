@@ -1,9 +1,10 @@
 //! Sections strung into branches, and which branches are worth keeping.
 
 use super::grow::Grown;
+use super::section::{Members, Shape, shape};
 use crate::cloud::Cloud;
 use crate::paths::NONE;
-use crate::vector::{Vector, distance, dot, to_segment};
+use crate::vector::{Vector, distance, dot, sub, to_segment};
 
 /// What a branch must explain at `detail` 1: the distances of its points from the surface of the
 /// branch it leaves, in spacings, added up. Measured: see `tests/real.rs`.
@@ -12,8 +13,11 @@ const EXPLAINED_SPACINGS: f64 = 5.0;
 /// Fewest points of a branch at `detail` 1.
 const FEWEST_POINTS: f64 = 3.0;
 
-/// Sections before and after the fork that a point may be nearest to instead.
-const AROUND_FORK: usize = 6;
+/// How far along the branch it leaves a side branch may be nearest to it: its own length times this.
+const ALONGSIDE: f64 = 1.5;
+
+/// Points within this many spacings of a surface are on it.
+const SURFACE_SPACINGS: f64 = 1.5;
 
 /// A run of sections from a fork to a tip.
 #[derive(Debug, Clone, PartialEq)]
@@ -24,7 +28,8 @@ pub(crate) struct Branch {
     pub(crate) parent: u32,
     /// Place in the sections of that branch.
     pub(crate) fork: u32,
-    /// Points of branches on it that were not worth keeping, with the place of their fork.
+    /// Points of branches on it that were not worth keeping, with the place of the section nearest to
+    /// each.
     pub(crate) absorbed: Vec<(u32, u32)>,
 }
 
@@ -94,66 +99,144 @@ fn goes_on(grown: &Grown, children: &[u32], at: u32, ahead: &[f64]) -> Option<u3
     best.map(|(_, child)| child)
 }
 
-/// Which branches are kept: tips inwards, a branch goes when what it explains is not worth it, and
-/// its points go to the branch it left.
-pub(crate) fn prune(
-    branches: &mut [Branch],
-    grown: &Grown,
-    cloud: &Cloud,
-    spacing_m: &[f64],
-    detail: f64,
-) -> Vec<bool> {
-    let mut kept = vec![true; branches.len()];
-    let mut carries = vec![false; branches.len()];
-    for own in (1..branches.len()).rev() {
-        let (parent, fork) = (branches[own].parent as usize, branches[own].fork);
-        let points = all_points(&branches[own], grown);
-        let worth = explained(&points, &branches[parent], fork, grown, cloud, spacing_m);
-        let enough = points.len() as f64 >= FEWEST_POINTS / detail;
-        kept[own] = carries[own] || (enough && worth >= EXPLAINED_SPACINGS / detail);
-        if kept[own] {
-            carries[parent] = true;
-        } else {
+/// What pruning looks at.
+#[derive(Debug)]
+pub(crate) struct Pruning<'a> {
+    pub(crate) grown: &'a Grown,
+    pub(crate) cloud: &'a Cloud,
+    pub(crate) spacing_m: &'a [f64],
+    pub(crate) detail: f64,
+}
+
+impl Pruning<'_> {
+    /// Which branches are kept: tips inwards, a branch goes when what it explains is not worth it, and
+    /// its points go to the branch it left.
+    pub(crate) fn prune(&self, branches: &mut [Branch]) -> Vec<bool> {
+        let mut kept = vec![true; branches.len()];
+        let mut carries = vec![false; branches.len()];
+        for own in (1..branches.len()).rev() {
+            let parent = branches[own].parent as usize;
+            kept[own] = carries[own] || self.is_worth(&branches[own], &branches[parent]);
+            if kept[own] {
+                carries[parent] = true;
+                continue;
+            }
+            let points = self.points_of(&branches[own]);
+            let near = self.alongside(&branches[own], &branches[parent]);
             branches[own].absorbed.clear();
-            branches[parent].absorbed.extend(points.into_iter().map(|point| (fork, point)));
+            let placed = points.into_iter().map(|point| (near.nearest(self.at(point)).1, point));
+            let placed: Vec<(u32, u32)> = placed.collect();
+            branches[parent].absorbed.extend(placed);
+        }
+        kept
+    }
+
+    fn at(&self, point: u32) -> Vector {
+        self.cloud.points[point as usize]
+    }
+
+    fn points_of(&self, branch: &Branch) -> Vec<u32> {
+        let own = branch.sections.iter().flat_map(|&section| self.grown.members(section as usize));
+        own.copied().chain(branch.absorbed.iter().map(|entry| entry.1)).collect()
+    }
+
+    /// Whether the distances of a branch's points from the surface of the one it leaves, in spacings,
+    /// add up to enough. Points on leaves count less. Tips come first: they tell most.
+    fn is_worth(&self, branch: &Branch, parent: &Branch) -> bool {
+        let points = self.points_of(branch);
+        if (points.len() as f64) < FEWEST_POINTS / self.detail {
+            return false;
+        }
+        let near = self.alongside(branch, parent);
+        let enough = EXPLAINED_SPACINGS / self.detail;
+        let mut worth = 0.0;
+        points.iter().rev().any(|&point| {
+            let spacing = self.spacing_m[point as usize].max(1e-6);
+            let wood = 0.25 + 0.75 * f64::from(self.cloud.wood[point as usize]);
+            let away = near.nearest(self.at(point)).0 - near.radius;
+            let surface = near.radius.min(SURFACE_SPACINGS * spacing);
+            worth += wood * (away - surface).max(0.0) / spacing;
+            worth >= enough
+        })
+    }
+
+    /// The part of the branch it leaves that a side branch may be near to.
+    fn alongside(&self, branch: &Branch, parent: &Branch) -> Alongside {
+        let centre = |&section: &u32| self.grown.sections[section as usize].shape.centre;
+        let fork = branch.fork as usize;
+        let on = centre(&parent.sections[fork]);
+        let own = branch.sections.iter().map(|section| distance(centre(section), on));
+        let reach = ALONGSIDE * own.fold(0.0, f64::max);
+        let near = |section: &&u32| distance(centre(section), on) <= reach;
+        let before = parent.sections[..fork].iter().rev().take_while(near).count().max(1);
+        let after = parent.sections[fork + 1..].iter().take_while(near).count().max(1);
+        let from = fork.saturating_sub(before);
+        let upto = (fork + after + 1).min(parent.sections.len());
+        let shape = &self.grown.sections[parent.sections[fork] as usize].shape;
+        Alongside {
+            axis: parent.sections[from..upto].iter().map(centre).collect(),
+            first: from as u32,
+            radius: shape.radius.max(shape.reach),
         }
     }
-    kept
+
+    /// Centres again for sections that have taken in points of their own surface: of a thin branch,
+    /// two sides may have grown apart.
+    pub(crate) fn take_in(&self, branch: &Branch, shapes: &mut [Shape]) {
+        let mut taken: Vec<Vec<u32>> = vec![Vec::new(); shapes.len()];
+        for &(place, point) in &branch.absorbed {
+            let shape = &shapes[place as usize];
+            let limit = shape.radius.max(shape.reach) + SURFACE_SPACINGS * shape.spacing;
+            let out = sub(self.at(point), shape.centre);
+            let along = dot(out, shape.along);
+            if dot(out, out) - along * along <= limit * limit {
+                taken[place as usize].push(point);
+            }
+        }
+        for place in 0..shapes.len() {
+            if taken[place].is_empty() {
+                continue;
+            }
+            let section = branch.sections[place] as usize;
+            taken[place].extend(self.grown.members(section));
+            let below = place.checked_sub(1).map(|place| shapes[place]);
+            shapes[place] = self.shape_of(&taken[place], &shapes[place], below.as_ref());
+        }
+    }
+
+    fn shape_of(&self, points: &[u32], own: &Shape, below: Option<&Shape>) -> Shape {
+        let positions: Vec<Vector> = points.iter().map(|&point| self.at(point)).collect();
+        let wood: Vec<f32> = points.iter().map(|&point| self.cloud.wood[point as usize]).collect();
+        let carried = own.last.carried;
+        let members =
+            Members { points: &positions, wood: &wood, spacing: own.spacing, carried };
+        Shape { along: own.along, ..shape(&members, below, own.last) }
+    }
 }
 
-fn all_points(branch: &Branch, grown: &Grown) -> Vec<u32> {
-    let own = branch.sections.iter().flat_map(|&section| grown.members(section as usize));
-    own.copied().chain(branch.absorbed.iter().map(|entry| entry.1)).collect()
+/// A stretch of a branch.
+struct Alongside {
+    axis: Vec<Vector>,
+    /// Place of the first section in the branch.
+    first: u32,
+    radius: f64,
 }
 
-/// Distances of points from the surface of the branch that would be left, in spacings, added up;
-/// points on leaves count less.
-fn explained(
-    points: &[u32],
-    parent: &Branch,
-    fork: u32,
-    grown: &Grown,
-    cloud: &Cloud,
-    spacing_m: &[f64],
-) -> f64 {
-    let from = (fork as usize).saturating_sub(AROUND_FORK);
-    let upto = (fork as usize + AROUND_FORK + 1).min(parent.sections.len());
-    let axis: Vec<Vector> = parent.sections[from..upto]
-        .iter()
-        .map(|&section| grown.sections[section as usize].shape.centre)
-        .collect();
-    let radius = grown.sections[parent.sections[fork as usize] as usize].shape.radius;
-    let worth = |&point: &u32| {
-        let p = cloud.points[point as usize];
-        let away = nearest_on(&axis, p);
-        let wood = 0.25 + 0.75 * f64::from(cloud.wood[point as usize]);
-        wood * (away - radius).max(0.0) / spacing_m[point as usize].max(1e-6)
-    };
-    points.iter().map(worth).sum()
-}
-
-/// Distance to a line of positions.
-fn nearest_on(axis: &[Vector], p: Vector) -> f64 {
-    let first = distance(axis[0], p);
-    axis.windows(2).map(|pair| to_segment(p, pair[0], pair[1]).0).fold(first, f64::min)
+impl Alongside {
+    /// Distance from the axis, and the place of the nearest section.
+    fn nearest(&self, p: Vector) -> (f64, u32) {
+        let mut best = (f64::INFINITY, 0);
+        for (place, centre) in self.axis.iter().enumerate() {
+            let away = distance(*centre, p);
+            if away < best.0 {
+                best = (away, place);
+            }
+        }
+        let (away, place) = best;
+        let from = place.saturating_sub(1);
+        let upto = (place + 2).min(self.axis.len());
+        let pairs = self.axis[from..upto].windows(2);
+        let away = pairs.map(|pair| to_segment(p, pair[0], pair[1]).0).fold(away, f64::min);
+        (away, self.first + place as u32)
+    }
 }

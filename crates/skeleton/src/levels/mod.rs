@@ -20,6 +20,7 @@ use crate::model::{GraphKind, Outcome, Report};
 use crate::paths::{Paths, shortest};
 use crate::vector::{Vector, distance};
 use crate::{SkeletonParams, base};
+use branches::Pruning;
 use grow::{Ground, Upwards};
 use pieces::{Gaps, Pieces};
 
@@ -99,8 +100,9 @@ fn build(
     };
     let grown = grow::grow(&ground, sources);
     let mut branches = branches::string(&grown);
-    let kept = branches::prune(&mut branches, &grown, cloud, spacing_m, params.detail);
-    assemble::assemble(cloud, &grown, &branches, &kept, base_m, params)
+    let pruning = Pruning { grown: &grown, cloud, spacing_m, detail: params.detail };
+    let kept = pruning.prune(&mut branches);
+    assemble::assemble(&pruning, &branches, &kept, base_m, params)
 }
 
 /// Where paths begin: the points around the root in the lowest share of the tree that are connected
