@@ -6,16 +6,23 @@ use crate::vector::{Vector, squared};
 const PAIRS: usize = 48;
 
 /// Parts points into groups with gaps of more than `gap_m` between them (single linkage), in the order
-/// of their first members.
-pub(crate) fn clusters(points: &[Vector], members: Vec<u32>, gap_m: f64) -> Vec<Vec<u32>> {
+/// of their first members. Members linked by their places are of one group anyway.
+pub(crate) fn clusters(
+    points: &[Vector],
+    members: Vec<u32>,
+    links: &[[usize; 2]],
+    gap_m: f64,
+) -> Vec<Vec<u32>> {
     if members.len() < 2 || gap_m == f64::INFINITY {
         return if members.is_empty() { Vec::new() } else { vec![members] };
     }
-    let group = if members.len() <= PAIRS {
+    let mut roots = if members.len() <= PAIRS {
         by_pairs(points, &members, gap_m)
     } else {
         by_cells(points, &members, gap_m)
     };
+    links.iter().for_each(|&[a, b]| join(&mut roots, a, b));
+    let group: Vec<usize> = (0..members.len()).map(|i| root(&mut roots, i)).collect();
     let mut place = vec![usize::MAX; members.len()];
     let mut groups: Vec<Vec<u32>> = Vec::new();
     for (member, root) in members.iter().zip(group) {
@@ -110,9 +117,11 @@ mod tests {
         for len in [10, 200] {
             let points: Vec<Vector> =
                 (0..len).map(|i| [f64::from(i / 2) * 0.1, f64::from(i % 2) * 0.5, 0.0]).collect();
-            let groups = clusters(&points, (0..len as u32).collect(), 0.12);
+            let groups = clusters(&points, (0..len as u32).collect(), &[], 0.12);
             assert_eq!(groups.len(), 2, "{len} points");
             assert!(groups[1].iter().all(|i| i % 2 == 1));
+            let linked = clusters(&points, (0..len as u32).collect(), &[[0, 1]], 0.12);
+            assert_eq!(linked.len(), 1);
         }
     }
 

@@ -14,6 +14,9 @@ const LENGTH_RADII: f64 = 1.0;
 const GAP_SPACINGS: f64 = 0.6;
 const GAP_RADII: f64 = 0.9;
 
+/// Steps of a path up to this many spacings do not part a section.
+const LINK_SPACINGS: f64 = 1.0;
+
 /// The tree of sections over the points.
 #[derive(Debug, Default)]
 pub(crate) struct Grown {
@@ -122,17 +125,12 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
     if !late.is_empty() {
         fronts.push(Front { parent: front.parent, seeds: late, from_m: upto });
     }
-    let mut next = 0;
-    while next < taken.len() {
-        let above = ground.upwards.of(taken[next]);
-        taken.extend(above.iter().filter(|point| length(point) < upto));
-        next += 1;
-    }
+    let links = take_above(ground, &mut taken, upto, spacing);
     let gap = match below {
         None => f64::INFINITY,
         Some(_) => (GAP_SPACINGS * ground.fineness * spacing).max(GAP_RADII * radius),
     };
-    for group in clusters(&ground.cloud.points, taken, gap) {
+    for group in clusters(&ground.cloud.points, taken, &links, gap) {
         let above = group.iter().flat_map(|&point| ground.upwards.of(point));
         let seeds: Vec<u32> = above.filter(|point| length(point) >= upto).copied().collect();
         let parent = grown.sections.len() as u32;
@@ -143,6 +141,31 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
             fronts.push(Front { parent, seeds, from_m: upto });
         }
     }
+}
+
+/// Adds the points above those taken, up to a level, and returns the places of points that a path
+/// joins without a leap: a thin row of points is one section, not several.
+fn take_above(
+    ground: &Ground<'_>,
+    taken: &mut Vec<u32>,
+    upto: f64,
+    spacing: f64,
+) -> Vec<[usize; 2]> {
+    let (mut links, mut next) = (Vec::new(), 0);
+    while next < taken.len() {
+        let from = taken[next];
+        for &to in ground.upwards.of(from) {
+            if ground.length_m[to as usize] < upto {
+                let step = ground.length_m[to as usize] - ground.length_m[from as usize];
+                if step <= LINK_SPACINGS * spacing {
+                    links.push([next, taken.len()]);
+                }
+                taken.push(to);
+            }
+        }
+        next += 1;
+    }
+    links
 }
 
 fn add_section(
