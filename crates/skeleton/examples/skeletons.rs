@@ -35,12 +35,15 @@ fn to_segment(p: [f64; 3], a: [f64; 3], b: [f64; 3]) -> f64 {
 /// boxes are near, found by brute force over a coarse grid.
 fn distances(points: &[[f64; 3]], skeleton: &Skeleton) -> (f64, f64) {
     let nodes = &skeleton.nodes;
-    let segment = |i: usize| (nodes[nodes[i].parent.unwrap() as usize].position_m, nodes[i].position_m);
+    let segment =
+        |i: usize| (nodes[nodes[i].parent.unwrap() as usize].position_m, nodes[i].position_m);
     let cell = |p: [f64; 3]| p.map(|v| (v / 0.25).floor() as i64);
-    let mut grid: std::collections::BTreeMap<[i64; 3], Vec<u32>> = std::collections::BTreeMap::new();
+    let mut grid: std::collections::BTreeMap<[i64; 3], Vec<u32>> =
+        std::collections::BTreeMap::new();
     for i in 1..nodes.len() {
         let (a, b) = segment(i);
-        let steps = (a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt() / 0.1).ceil();
+        let steps =
+            (a.iter().zip(b).map(|(x, y)| (x - y) * (x - y)).sum::<f64>().sqrt() / 0.1).ceil();
         let mut last = None;
         for s in 0..=steps as usize {
             let t = if steps > 0.0 { s as f64 / steps } else { 0.0 };
@@ -62,7 +65,8 @@ fn distances(points: &[[f64; 3]], skeleton: &Skeleton) -> (f64, f64) {
                         if x.abs().max(y.abs()).max(z.abs()) != ring {
                             continue;
                         }
-                        for &i in grid.get(&[at[0] + x, at[1] + y, at[2] + z]).into_iter().flatten() {
+                        for &i in grid.get(&[at[0] + x, at[1] + y, at[2] + z]).into_iter().flatten()
+                        {
                             let (a, b) = segment(i as usize);
                             let d = to_segment(*p, a, b);
                             if d < best.0 {

@@ -5,7 +5,9 @@
 #[non_exhaustive]
 pub enum Error {
     /// No point has a position.
-    #[error("no skeleton of {given} points, of which {not_finite} have a coordinate that is no finite number: at least 2 different positions are needed")]
+    #[error(
+        "no skeleton of {given} points, of which {not_finite} have a coordinate that is no finite number: at least 2 different positions are needed"
+    )]
     NoPoints {
         /// Points given.
         given: usize,

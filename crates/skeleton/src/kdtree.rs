@@ -106,7 +106,9 @@ impl KdTree {
             }
             if node.left == 0 {
                 let own = node.start as usize..node.end as usize;
-                found.extend(own.filter(|&i| squared(self.points[i], *at) <= most).map(|i| self.index[i]));
+                found.extend(
+                    own.filter(|&i| squared(self.points[i], *at) <= most).map(|i| self.index[i]),
+                );
             } else {
                 stack.extend([node.left + 1, node.left]);
             }
@@ -198,9 +200,8 @@ fn split(points: &mut [(Vector, u32)], node: &Node) {
     let width = |axis: usize| node.max[axis] - node.min[axis];
     let axis = (1..3).fold(0, |best, axis| if width(axis) > width(best) { axis } else { best });
     let middle = points.len() / 2;
-    points.select_nth_unstable_by(middle, |a, b| {
-        a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1))
-    });
+    points
+        .select_nth_unstable_by(middle, |a, b| a.0[axis].total_cmp(&b.0[axis]).then(a.1.cmp(&b.1)));
 }
 
 #[cfg(test)]

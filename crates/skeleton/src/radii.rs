@@ -31,9 +31,8 @@ pub(crate) fn allometric_radii(nodes: &mut [Node], seen: &[Seen], fallback_m: f6
         .iter()
         .map(|s| [libm::log(length(s.node as usize)), libm::log(s.radius_m), f64::from(s.points)])
         .collect();
-    let (factor, exponent) = fit(&logs).unwrap_or_else(|| {
-        (libm::log(fallback_m) - PIPE * libm::log(length(0)), PIPE)
-    });
+    let (factor, exponent) =
+        fit(&logs).unwrap_or_else(|| (libm::log(fallback_m) - PIPE * libm::log(length(0)), PIPE));
     for (place, node) in nodes.iter_mut().enumerate() {
         node.radius_m = libm::exp(factor + exponent * libm::log(length(place)));
     }
@@ -95,8 +94,11 @@ mod tests {
     fn the_law_behind_radii_is_found() {
         let mut nodes = tree();
         let law = |length: f64| 0.02 * libm::pow(length, 0.7);
-        let seen = [(1u32, 11.5), (2, 2.5), (3, 2.0)]
-            .map(|(node, length)| Seen { node, radius_m: law(length), points: 10 });
+        let seen = [(1u32, 11.5), (2, 2.5), (3, 2.0)].map(|(node, length)| Seen {
+            node,
+            radius_m: law(length),
+            points: 10,
+        });
         allometric_radii(&mut nodes, &seen, 1.0);
         for (node, length) in nodes.iter().skip(1).zip([11.5, 2.5, 2.0]) {
             assert!((node.radius_m - law(length)).abs() < 1e-12);

@@ -3,7 +3,9 @@
 use crate::{Outcome, SkeletonParams, skeleton};
 use timberline_artefact::kinds::{Consolidated, Skeletons, TreeCloud};
 use timberline_artefact::kinds::{Skeleton as Wire, SkeletonNode};
-use timberline_artefact::stage::{Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo};
+use timberline_artefact::stage::{
+    Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
+};
 use timberline_artefact::{Facts, Kind, UnitKind};
 use timberline_pointcloud::PointCloud;
 
@@ -17,8 +19,7 @@ impl Params for SkeletonParams {
     }
 }
 
-const INPUTS: &[InputSpec] =
-    &[InputSpec::own(TreeCloud::NAME), InputSpec::own(Consolidated::NAME)];
+const INPUTS: &[InputSpec] = &[InputSpec::own(TreeCloud::NAME), InputSpec::own(Consolidated::NAME)];
 
 impl Stage for SkeletonStage {
     type Params = SkeletonParams;

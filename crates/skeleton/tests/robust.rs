@@ -121,8 +121,7 @@ fn a_planar_wall() {
 fn the_second_tree_in_a_cloud_is_cut_off_and_counted() {
     let one = scan(&fork(), 2000.0, 0.003, 4);
     let mut both = one.clone();
-    let second: Vec<Point> =
-        one.iter().take(2500).map(|p| add(*p, [9.0, 0.0, 0.5])).collect();
+    let second: Vec<Point> = one.iter().take(2500).map(|p| add(*p, [9.0, 0.0, 0.5])).collect();
     both.extend(&second);
     let found = skeleton(&both, None, None, &SkeletonParams::default()).unwrap();
     check(&found);
@@ -163,7 +162,7 @@ fn a_tree_without_its_lower_stem_begins_where_its_points_do() {
 
 #[test]
 fn shuffled_points_give_the_same_skeleton() {
-    let points = scan(&spruce(), 2000.0, 0.003, 7);
+    let points = scan(&spruce(), 800.0, 0.003, 7);
     let mut shuffled = points.clone();
     let mut random = common::seeded(8);
     for i in (1..shuffled.len()).rev() {
@@ -178,7 +177,7 @@ fn shuffled_points_give_the_same_skeleton() {
 #[test]
 fn a_shift_by_whole_metres_shifts_the_skeleton() {
     let lattice = |p: &Point| p.map(|value| (value * 10_000.0).round() / 10_000.0);
-    let points: Vec<Point> = scan(&spruce(), 2000.0, 0.003, 9).iter().map(lattice).collect();
+    let points: Vec<Point> = scan(&spruce(), 800.0, 0.003, 9).iter().map(lattice).collect();
     let by = [500_000.0, 5_000_000.0, 1000.0];
     let shifted: Vec<Point> = points.iter().map(|p| add(*p, by)).collect();
     for (a, b) in each(&points).iter().zip(each(&shifted)) {
@@ -194,7 +193,7 @@ fn a_shift_by_whole_metres_shifts_the_skeleton() {
 
 #[test]
 fn one_and_two_threads_give_the_same_skeleton() {
-    let points = scan(&spruce(), 4000.0, 0.003, 10);
+    let points = scan(&spruce(), 1500.0, 0.003, 10);
     let with = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| each(&points))

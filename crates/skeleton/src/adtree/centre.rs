@@ -66,11 +66,7 @@ pub(super) fn centre(points: &[Vector], root: u32, first_radius: f64) -> Vec<Vec
         }
         let off = |&other: &u32| (density[other as usize] - own).abs();
         let difference = found.iter().map(off).sum::<f64>() / (own * found.len() as f64);
-        if difference < EVEN {
-            mean(found.iter().map(|&other| points[other as usize]))
-        } else {
-            *p
-        }
+        if difference < EVEN { mean(found.iter().map(|&other| points[other as usize])) } else { *p }
     };
     points.par_iter().zip(&density).map(moved).collect()
 }

@@ -12,7 +12,8 @@ const PIECE_M: f64 = 0.05;
 pub(super) fn skeleton(tree: &Tree) -> Skeleton {
     let longest = tree.longest();
     let radius_m = tree.radius_m[tree.root as usize];
-    let root = Node { position_m: tree.position[tree.root as usize], parent: None, radius_m, points: 0 };
+    let root =
+        Node { position_m: tree.position[tree.root as usize], parent: None, radius_m, points: 0 };
     let mut nodes = vec![root];
     let mut open = vec![(tree.root, 0u32, sorted(tree, tree.root, &longest))];
     // Branch by branch: the first child goes on at once, the others wait.
@@ -54,7 +55,8 @@ fn edge(tree: &Tree, nodes: &mut Vec<Node>, v: u32, from: u32, longest: &[f64]) 
     };
     let start = tangent(before.map_or(a, position), b);
     let end = tangent(a, after.map_or(b, position));
-    let radii = [if parent == tree.root { v } else { parent }, v].map(|p| tree.radius_m[p as usize]);
+    let radii =
+        [if parent == tree.root { v } else { parent }, v].map(|p| tree.radius_m[p as usize]);
     let pieces = ((length / PIECE_M).ceil() as u32).max(1);
     let (mut last, points) = (from, tree.points[v as usize]);
     for piece in 1..=pieces {

@@ -125,8 +125,7 @@ mod tests {
     fn paths_over_delaunay_are_those_over_all_pairs() {
         let points: Vec<Vector> = cloud().into_iter().take(250).collect();
         let length = |a: u32, b: u32| squared(points[a as usize], points[b as usize]);
-        let all: Vec<[u32; 2]> =
-            (0..250).flat_map(|a| (a + 1..250).map(move |b| [a, b])).collect();
+        let all: Vec<[u32; 2]> = (0..250).flat_map(|a| (a + 1..250).map(move |b| [a, b])).collect();
         let exact = shortest(&Graph::new(250, &all), &[(0, 0.0)], length).cost;
         let over = shortest(&delaunay(&points).unwrap(), &[(0, 0.0)], length).cost;
         for (a, b) in exact.iter().zip(&over) {

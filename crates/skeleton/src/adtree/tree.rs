@@ -85,7 +85,8 @@ impl Tree {
             }
             let own = length[v as usize];
             let keep = |&c: &u32| (length[c as usize] + self.edge_m(c)) / own >= KEEP_SHARE;
-            let (kept, out): (Vec<u32>, Vec<u32>) = self.children[v as usize].iter().partition(|c| keep(c));
+            let (kept, out): (Vec<u32>, Vec<u32>) =
+                self.children[v as usize].iter().partition(|c| keep(c));
             self.children[v as usize] = kept;
             for branch in out {
                 self.cut(branch, v);

@@ -45,9 +45,8 @@ impl Graph {
 
     /// Every edge once, from the smaller vertex to the larger, sorted.
     pub fn edges(&self) -> impl Iterator<Item = [u32; 2]> {
-        (0..self.len() as u32).flat_map(move |a| {
-            self.of(a).iter().filter(move |&&b| b > a).map(move |&b| [a, b])
-        })
+        (0..self.len() as u32)
+            .flat_map(move |a| self.of(a).iter().filter(move |&&b| b > a).map(move |&b| [a, b]))
     }
 
     /// The graph with more edges.

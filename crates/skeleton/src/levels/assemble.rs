@@ -148,8 +148,7 @@ fn put(made: &mut Made, line: &Line, branch: &Branch, from: Option<u32>, simplif
     let shape = |i: usize| &line.shapes[i.clamp(1, sections) - 1];
     let tolerance: Vec<f64> =
         (0..len).map(|i| simplify_by * shape(i).radius.max(0.25 * shape(i).spacing)).collect();
-    let fixed: Vec<bool> =
-        (0..len).map(|i| i >= 1 && i <= sections && line.forks[i - 1]).collect();
+    let fixed: Vec<bool> = (0..len).map(|i| i >= 1 && i <= sections && line.forks[i - 1]).collect();
     let needed = simplify(&line.at, &tolerance, &fixed);
     let mut parent = from;
     let mut points = 0;

@@ -57,9 +57,9 @@ pub(crate) fn simplify(line: &[Vector], tolerance: &[f64], fixed: &[bool]) -> Ve
     let mut open: Vec<(usize, usize)> = stops.windows(2).map(|w| (w[0], w[1])).collect();
     while let Some((from, to)) = open.pop() {
         let excess = |i: usize| to_segment(line[i], line[from], line[to]).0 - tolerance[i];
-        let worst = (from + 1..to).map(|i| (excess(i), i)).fold((0.0, 0), |worst, new| {
-            if new.0 > worst.0 { new } else { worst }
-        });
+        let worst = (from + 1..to)
+            .map(|i| (excess(i), i))
+            .fold((0.0, 0), |worst, new| if new.0 > worst.0 { new } else { worst });
         if worst.0 > 0.0 {
             needed[worst.1] = true;
             open.extend([(from, worst.1), (worst.1, to)]);

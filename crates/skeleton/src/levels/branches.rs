@@ -208,8 +208,7 @@ impl Pruning<'_> {
         let positions: Vec<Vector> = points.iter().map(|&point| self.at(point)).collect();
         let wood: Vec<f32> = points.iter().map(|&point| self.cloud.wood[point as usize]).collect();
         let carried = own.last.carried;
-        let members =
-            Members { points: &positions, wood: &wood, spacing: own.spacing, carried };
+        let members = Members { points: &positions, wood: &wood, spacing: own.spacing, carried };
         Shape { along: own.along, ..shape(&members, below, own.last) }
     }
 }

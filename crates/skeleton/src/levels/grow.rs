@@ -168,13 +168,7 @@ fn take_above(
     links
 }
 
-fn add_section(
-    ground: &Ground<'_>,
-    grown: &mut Grown,
-    parent: u32,
-    group: &[u32],
-    carried: f64,
-) {
+fn add_section(ground: &Ground<'_>, grown: &mut Grown, parent: u32, group: &[u32], carried: f64) {
     let below: Option<Shape> = grown.sections.get(parent as usize).map(|section| section.shape);
     let points: Vec<Vector> = group.iter().map(|&p| ground.cloud.points[p as usize]).collect();
     let wood: Vec<f32> = group.iter().map(|&p| ground.cloud.wood[p as usize]).collect();

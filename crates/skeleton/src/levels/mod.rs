@@ -46,8 +46,7 @@ pub(crate) fn skeleton(
     let tree = KdTree::new(&cloud.points);
     let near = Neighbours::by(&tree, &cloud.points, params.neighbours as usize, SPACING_RANK);
     let spacing_m = median(&near.spacing_m);
-    let gaps =
-        Gaps { spacing_m: &near.spacing_m, median_m: spacing_m, gap_m: params.gap_m };
+    let gaps = Gaps { spacing_m: &near.spacing_m, median_m: spacing_m, gap_m: params.gap_m };
     let graph = gaps.close(&near, &cloud.points);
     let pieces = Pieces::new(&tree, &cloud.points, &graph);
     drop(tree);

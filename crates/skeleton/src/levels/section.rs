@@ -105,8 +105,7 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first: Known) 
         // One bad circle must not lead those after it astray: the middle of what was known and seen.
         let known = below.map_or(radius, |_| pipe);
         let (radius_known, centre_known) = (0.5 * (known + radius), Some(centre));
-        let last =
-            Known { centre: centre_known, radius: radius_known, carried: members.carried };
+        let last = Known { centre: centre_known, radius: radius_known, carried: members.carried };
         return Shape { centre, middle, along, radius, round: true, reach: radius, last, spacing };
     }
     let away = |p: &Vector| {
@@ -114,7 +113,7 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first: Known) 
         norm(sub(out, scale(along, dot(out, along))))
     };
     let radius = members.points.iter().map(away).sum::<f64>() / members.points.len() as f64;
-        let held = below.map_or(0.0, |below| HOLD * below.reach);
+    let held = below.map_or(0.0, |below| HOLD * below.reach);
     let reach = radius.max(held).min(ABOVE_PIPE * pipe);
     Shape { centre: middle, middle, along, radius, round: false, reach, last, spacing }
 }
@@ -136,10 +135,8 @@ fn round(
 ) -> Option<(Vector, f64)> {
     let [u, v] = across(along);
     let seen = members.points.iter().zip(members.wood).filter(|(_, wood)| **wood >= 0.5);
-    let flat: Vec<[f64; 2]> = seen
-        .map(|(p, _)| sub(*p, middle))
-        .map(|out| [dot(out, u), dot(out, v)])
-        .collect();
+    let flat: Vec<[f64; 2]> =
+        seen.map(|(p, _)| sub(*p, middle)).map(|out| [dot(out, u), dot(out, v)]).collect();
     if flat.len() < CIRCLE_POINTS {
         return None;
     }

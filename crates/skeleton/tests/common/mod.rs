@@ -34,9 +34,8 @@ impl Tube {
             let length = distance(pair[0], pair[1]);
             let along = scale(sub(pair[1], pair[0]), 1.0 / length);
             let (u, v) = across(along);
-            let radius = |t: f64| {
-                self.radii_m[0] + (self.radii_m[1] - self.radii_m[0]) * (done + t) / whole
-            };
+            let radius =
+                |t: f64| self.radii_m[0] + (self.radii_m[1] - self.radii_m[0]) * (done + t) / whole;
             let sector = self.seen[1] - self.seen[0];
             let count = (per_m2 * length * radius(0.5 * length) * sector) as usize;
             for _ in 0..count {
