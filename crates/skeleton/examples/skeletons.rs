@@ -2,7 +2,8 @@
 //! `cargo run --release -p timberline-skeleton --example skeletons -- [detail=1] [method=levels] [out=FOLDER] FILE…`
 //!
 //! Per cloud: points, branches, nodes, CPU time, and the distance of the points from the skeleton's
-//! tubes when every segment has the median distance of its own points as radius.
+//! tubes when every segment has the median distance of its own points as radius. With
+//! `TIMBERLINE_NO_DISTANCES=1` they are left out, to see time and memory alone.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example prints")]
 
 use std::fmt::Write as _;
@@ -122,7 +123,8 @@ fn one(path: &str, params: &SkeletonParams, out: Option<&str>) {
     let start = Instant::now();
     let found = skeleton(&points, None, None, params).unwrap();
     let seconds = start.elapsed().as_secs_f64();
-    let (mean, rms) = distances(&points, &found.skeleton);
+    let far = std::env::var_os("TIMBERLINE_NO_DISTANCES").is_none();
+    let (mean, rms) = if far { distances(&points, &found.skeleton) } else { (f64::NAN, f64::NAN) };
     let name = path.rsplit('/').next().unwrap();
     println!(
         "{name:22} {:7} points {:5} branches {:6} nodes {seconds:6.3} s  mean {:6.1} rms {:6.1} mm  cut {} spacing {:.1} mm  first radius {:.3}",

@@ -23,7 +23,6 @@ struct Line {
     points: Vec<u32>,
     /// Sections that other branches leave from.
     forks: Vec<bool>,
-    has_tip: bool,
 }
 
 /// Nodes so far, and where sections are among them.
@@ -102,7 +101,7 @@ fn line(
     at.extend(&centres);
     at.extend(tip);
     let forks = branch.sections.iter().map(|&s| forks[s as usize]).collect();
-    Line { at, shapes, points, forks, has_tip: tip.is_some() }
+    Line { at, shapes, points, forks }
 }
 
 /// The foot of the stem: its axis drawn out to the base, or to the height of its lowest points.
@@ -143,37 +142,47 @@ fn tip(
 
 /// Adds the nodes of a branch. `from` is the node it leaves from; the stem has none.
 fn put(made: &mut Made, line: &Line, branch: &Branch, from: Option<u32>, simplify_by: f64) {
-    let len = line.at.len();
-    let sections = line.shapes.len();
-    let shape = |i: usize| &line.shapes[i.clamp(1, sections) - 1];
-    let tolerance: Vec<f64> =
-        (0..len).map(|i| simplify_by * shape(i).radius.max(0.25 * shape(i).spacing)).collect();
-    let fixed: Vec<bool> = (0..len).map(|i| i >= 1 && i <= sections && line.forks[i - 1]).collect();
-    let needed = simplify(&line.at, &tolerance, &fixed);
-    let mut parent = from;
-    let mut points = 0;
+    let needed = line.needed(simplify_by);
+    let (mut parent, mut points) = (from, 0);
     let mut circles = Vec::new();
-    for i in 0..len {
-        if i >= 1 && i <= sections {
-            points += line.points[i - 1];
-            if shape(i).round {
-                circles.push((shape(i).radius, line.points[i - 1]));
+    for i in 0..line.at.len() {
+        let section = line.section(i);
+        if let Some(section) = section {
+            points += line.points[section];
+            if line.shapes[section].round {
+                circles.push((line.shapes[section].radius, line.points[section]));
             }
         }
         if !needed[i] || (i == 0 && from.is_some()) {
             continue;
         }
-        let own = made.nodes.len() as u32;
-        made.seen.extend(circles.drain(..).map(|(radius_m, points)| Seen {
-            node: own,
-            radius_m,
-            points,
-        }));
+        let node = made.nodes.len() as u32;
+        let seen = |(radius_m, points)| Seen { node, radius_m, points };
+        made.seen.extend(circles.drain(..).map(seen));
         made.nodes.push(Node { position_m: line.at[i], parent, radius_m: 0.0, points });
-        if i >= 1 && i <= sections {
-            made.of_section[branch.sections[i - 1] as usize] = own;
+        if let Some(section) = section {
+            made.of_section[branch.sections[section] as usize] = node;
         }
-        (parent, points) = (Some(own), 0);
+        (parent, points) = (Some(node), 0);
     }
-    debug_assert!(line.has_tip || needed[sections]);
+}
+
+impl Line {
+    /// The section at a place: none at the first, nor at a tip.
+    fn section(&self, place: usize) -> Option<usize> {
+        place.checked_sub(1).filter(|section| *section < self.shapes.len())
+    }
+
+    /// The places that become nodes.
+    fn needed(&self, simplify_by: f64) -> Vec<bool> {
+        let last = self.shapes.len() - 1;
+        let tolerance = |i: usize| {
+            let shape = &self.shapes[i.saturating_sub(1).min(last)];
+            simplify_by * shape.radius.max(0.25 * shape.spacing)
+        };
+        let tolerance: Vec<f64> = (0..self.at.len()).map(tolerance).collect();
+        let fork = |i: usize| self.section(i).is_some_and(|section| self.forks[section]);
+        let fixed: Vec<bool> = (0..self.at.len()).map(fork).collect();
+        simplify(&self.at, &tolerance, &fixed)
+    }
 }

@@ -165,7 +165,7 @@ mod tests {
 
     #[test]
     fn full_and_third_arcs_and_outliers() {
-        let whole = fit(&arc(0.0, 6.28, 0.003), None).unwrap();
+        let whole = fit(&arc(0.0, std::f64::consts::TAU, 0.003), None).unwrap();
         assert!((whole.radius - 0.15).abs() < 0.001 && whole.spread < 0.003, "{whole:?}");
         let mut third = arc(0.3, 2.4, 0.003);
         third.extend([[3.4, -2.3], [2.6, -1.5], [3.1, -1.4]]);

@@ -108,28 +108,19 @@ pub(crate) fn grow(ground: &Ground<'_>, sources: Vec<u32>) -> Grown {
 
 /// Takes the points up to the next level set, parts them, and adds the sections and their fronts.
 fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut Vec<Front>) {
-    let length = |&p: &u32| ground.length_m[p as usize];
     let below = grown.sections.get(front.parent as usize).map(|section| section.shape);
     let spacing = mean_spacing(ground, &front.seeds);
-    let radius = below.map_or(ground.first_radius_m, |below| below.reach);
-    let step = match below {
-        None => ground.first_length_m,
-        Some(_) => (LENGTH_SPACINGS * ground.fineness * spacing).max(LENGTH_RADII * radius),
-    };
-    let first = front.seeds.iter().map(length).fold(f64::INFINITY, f64::min);
-    // Seeds beyond the whole next section come over a gap: they begin at their own distance.
-    let from = if first < front.from_m + step { front.from_m } else { first };
-    let upto = from + step;
+    let upto = front.upto(ground, below.as_ref(), spacing);
+    let length = |&p: &u32| ground.length_m[p as usize];
     let (mut taken, late): (Vec<u32>, Vec<u32>) =
         front.seeds.iter().partition(|point| length(point) < upto);
     if !late.is_empty() {
         fronts.push(Front { parent: front.parent, seeds: late, from_m: upto });
     }
     let links = take_above(ground, &mut taken, upto, spacing);
-    let gap = match below {
-        None => f64::INFINITY,
-        Some(_) => (GAP_SPACINGS * ground.fineness * spacing).max(GAP_RADII * radius),
-    };
+    let gap = below.map_or(f64::INFINITY, |below| {
+        (GAP_SPACINGS * ground.fineness * spacing).max(GAP_RADII * below.reach)
+    });
     for group in clusters(&ground.cloud.points, taken, &links, gap) {
         let above = group.iter().flat_map(|&point| ground.upwards.of(point));
         let seeds: Vec<u32> = above.filter(|point| length(point) >= upto).copied().collect();
@@ -140,6 +131,20 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
         if !seeds.is_empty() {
             fronts.push(Front { parent, seeds, from_m: upto });
         }
+    }
+}
+
+impl Front {
+    /// Length of the paths at the next level set, m.
+    fn upto(&self, ground: &Ground<'_>, below: Option<&Shape>, spacing: f64) -> f64 {
+        let step = below.map_or(ground.first_length_m, |below| {
+            (LENGTH_SPACINGS * ground.fineness * spacing).max(LENGTH_RADII * below.reach)
+        });
+        let lengths = self.seeds.iter().map(|&point| ground.length_m[point as usize]);
+        let first = lengths.fold(f64::INFINITY, f64::min);
+        // Seeds beyond the whole next section come over a gap: they begin at their own distance.
+        let from = if first < self.from_m + step { self.from_m } else { first };
+        from + step
     }
 }
 
