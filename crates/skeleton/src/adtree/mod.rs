@@ -1,16 +1,18 @@
 //! The steps and constants of AdTree (Du, Lindenbergh, Ledoux, Stoter and Nan 2019), from its paper
 //! and from what its program was seen to do. Nothing here is meant to be better.
 //!
-//! 1. Points are thinned; the first radius is half the extent of the lowest ones ([`centre`]).
-//! 2. Points of trunk and main branches move to the middle of their neighbours ([`centre`]).
+//! 1. Points are thinned; the first radius is half the extent of the lowest ones (`centre`).
+//! 2. Points of trunk and main branches move to the middle of their neighbours (`centre`).
 //! 3. Delaunay edges weighted by squared length; shortest paths from the lowest point, or the
-//!    minimum spanning tree ([`span`]).
-//! 4. Small subtrees are left out; radii follow from the length of what is left ([`tree`]).
-//! 5. Parallel siblings are merged, vertices on straight lines removed ([`simplify`]).
-//! 6. The trunk's radius is that of a cylinder fitted to its points ([`trunk`]).
-//! 7. Branches are smoothed as Hermite curves ([`hermite`]).
+//!    minimum spanning tree (`span`).
+//! 4. Small subtrees are left out; radii follow from the length of what is left (`tree`).
+//! 5. Parallel siblings are merged, vertices on straight lines removed (`simplify`).
+//! 6. The trunk's radius is that of a cylinder fitted to its points (`trunk`).
+//! 7. Branches are smoothed as Hermite curves (`hermite`).
 //!
-//! Where neither source gives a detail, the module says what was chosen.
+//! Where neither source gives a detail, the module says what was chosen. Branches made by these steps
+//! and, in brackets, by the program on its own clouds (`tests/real.rs`): tree1 2424 (2508), tree13 1361
+//! (1569), tree33 2112 (2275), Lille_11 3221 (3781).
 
 mod centre;
 mod hermite;
