@@ -207,8 +207,7 @@ impl Pruning<'_> {
     fn shape_of(&self, points: &[u32], own: &Shape, below: Option<&Shape>) -> Shape {
         let positions: Vec<Vector> = points.iter().map(|&point| self.at(point)).collect();
         let wood: Vec<f32> = points.iter().map(|&point| self.cloud.wood[point as usize]).collect();
-        let carried = own.last.carried;
-        let members = Members { points: &positions, wood: &wood, spacing: own.spacing, carried };
+        let members = Members { points: &positions, wood: &wood, spacing: own.spacing, share: 1.0 };
         Shape { along: own.along, ..shape(&members, below, own.last) }
     }
 }

@@ -121,13 +121,21 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
     let gap = below.map_or(f64::INFINITY, |below| {
         (GAP_SPACINGS * ground.fineness * spacing).max(GAP_RADII * below.reach)
     });
-    for group in clusters(&ground.cloud.points, taken, &links, gap) {
+    let groups = clusters(&ground.cloud.points, taken, &links, gap);
+    let seeds = |group: &Vec<u32>| -> Vec<u32> {
         let above = group.iter().flat_map(|&point| ground.upwards.of(point));
-        let seeds: Vec<u32> = above.filter(|point| length(point) >= upto).copied().collect();
+        above.filter(|point| length(point) >= upto).copied().collect()
+    };
+    let seeds: Vec<Vec<u32>> = groups.iter().map(seeds).collect();
+    let beyond = |&point: &u32| f64::from(ground.upwards.beyond[point as usize]);
+    let carried = |(group, seeds): (&Vec<u32>, &Vec<u32>)| {
+        group.len() as f64 + seeds.iter().map(beyond).sum::<f64>()
+    };
+    let carried: Vec<f64> = groups.iter().zip(&seeds).map(carried).collect();
+    let total: f64 = carried.iter().sum();
+    for ((group, seeds), carried) in groups.iter().zip(seeds).zip(carried) {
         let parent = grown.sections.len() as u32;
-        let beyond = |&point: &u32| f64::from(ground.upwards.beyond[point as usize]);
-        let carried = group.len() as f64 + seeds.iter().map(beyond).sum::<f64>();
-        add_section(ground, grown, front.parent, &group, carried);
+        add_section(ground, grown, front.parent, group, carried / total);
         if !seeds.is_empty() {
             fronts.push(Front { parent, seeds, from_m: upto });
         }
@@ -173,13 +181,13 @@ fn take_above(
     links
 }
 
-fn add_section(ground: &Ground<'_>, grown: &mut Grown, parent: u32, group: &[u32], carried: f64) {
+fn add_section(ground: &Ground<'_>, grown: &mut Grown, parent: u32, group: &[u32], share: f64) {
     let below: Option<Shape> = grown.sections.get(parent as usize).map(|section| section.shape);
     let points: Vec<Vector> = group.iter().map(|&p| ground.cloud.points[p as usize]).collect();
     let wood: Vec<f32> = group.iter().map(|&p| ground.cloud.wood[p as usize]).collect();
     let spacing = mean_spacing(ground, group);
-    let members = Members { points: &points, wood: &wood, spacing, carried };
-    let first = Known { centre: None, radius: ground.first_radius_m, carried };
+    let members = Members { points: &points, wood: &wood, spacing, share };
+    let first = Known { centre: None, radius: ground.first_radius_m };
     let shape = shape(&members, below.as_ref(), first);
     let start = grown.points.len() as u32;
     grown.points.extend_from_slice(group);

@@ -34,19 +34,13 @@ pub(crate) struct Shape {
     pub(crate) spacing: f64,
 }
 
-/// A radius and how many points the branch carried there: it and all beyond.
+/// What circles on the way from the base have told.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Known {
+    /// Centre of the last one.
     pub(crate) centre: Option<Vector>,
+    /// Radius, m, made smaller at every fork since by the pipe model (Shinozaki et al. 1964).
     pub(crate) radius: f64,
-    pub(crate) carried: f64,
-}
-
-impl Known {
-    /// The radius by the pipe model (Shinozaki et al. 1964) where the branch carries other points.
-    fn at(&self, carried: f64) -> f64 {
-        self.radius * (carried / self.carried).min(1.0).sqrt()
-    }
 }
 
 /// Fewest points of a circle.
@@ -79,8 +73,8 @@ pub(crate) struct Members<'a> {
     /// Likelihood of wood of each: leaves do not move the axis.
     pub(crate) wood: &'a [f32],
     pub(crate) spacing: f64,
-    /// Points of the branch here and of all beyond.
-    pub(crate) carried: f64,
+    /// Share of what the branch below carries, in points: 1 where there is no fork.
+    pub(crate) share: f64,
 }
 
 /// Finds the shape of a section above another, or of the first one, of which a radius is known
@@ -95,7 +89,7 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first: Known) 
         }
     };
     let last = below.map_or(first, |below| below.last);
-    let pipe = last.at(members.carried);
+    let pipe = last.radius * members.share.sqrt();
     let most = match below {
         None => ROUND_ABOVE_PIPE * first.radius,
         Some(_) => (SWELL * last.radius).min(ROUND_ABOVE_PIPE * pipe),
@@ -105,7 +99,7 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first: Known) 
         // One bad circle must not lead those after it astray: the middle of what was known and seen.
         let known = below.map_or(radius, |_| pipe);
         let (radius_known, centre_known) = (0.5 * (known + radius), Some(centre));
-        let last = Known { centre: centre_known, radius: radius_known, carried: members.carried };
+        let last = Known { centre: centre_known, radius: radius_known };
         return Shape { centre, middle, along, radius, round: true, reach: radius, last, spacing };
     }
     let away = |p: &Vector| {
@@ -114,6 +108,7 @@ pub(crate) fn shape(members: &Members<'_>, below: Option<&Shape>, first: Known) 
     };
     let radius = members.points.iter().map(away).sum::<f64>() / members.points.len() as f64;
     let held = below.map_or(0.0, |below| HOLD * below.reach);
+    let last = Known { radius: pipe, ..last };
     let reach = radius.max(held).min(ABOVE_PIPE * pipe);
     Shape { centre: middle, middle, along, radius, round: false, reach, last, spacing }
 }
@@ -140,7 +135,7 @@ fn round(
     if flat.len() < CIRCLE_POINTS {
         return None;
     }
-    let prior = below.map(|b| b.last.at(members.carried));
+    let prior = below.map(|b| b.last.radius * members.share.sqrt());
     let prior = prior.map(|radius| Prior { radius, deviation: PRIOR_DEVIATION * radius });
     accept(&fit(&flat, prior)?, members, middle, [u, v], below, most)
 }
