@@ -12,7 +12,8 @@ pub struct Node {
     /// Radius of the branch between this node and its parent by the allometric rule of the method,
     /// m; at the root, that of its first child.
     pub radius_m: f64,
-    /// Number of points that are nearest to the branch between this node and its parent.
+    /// Number of points of the branch between this node and its parent: those of its sections, and
+    /// those of side branches on it that were not kept. Nearly always these are nearest to it.
     pub points: u32,
 }
 

@@ -98,8 +98,7 @@ pub fn fork() -> Vec<Tube> {
     ]
 }
 
-/// Distances of positions every 2 cm along the skeleton from the nearest axis, m, from `skip_m` of
-/// way above the root.
+/// Distances of positions every 2 cm along the skeleton from the nearest axis, m.
 pub fn off_axis(skeleton: &Skeleton, tubes: &[Tube]) -> Vec<f64> {
     let mut away = Vec::new();
     for node in &skeleton.nodes {
