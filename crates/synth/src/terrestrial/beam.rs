@@ -2,7 +2,7 @@
 
 use super::points::Label;
 use super::scan_params::ScanParams;
-use super::targets::{NO_CYLINDER, Owner, RayHit, Targets};
+use super::targets::{NO_CYLINDER, Owner, Ray, RayHit, Targets};
 use super::vector::{Vec3, across, along, dot, unit};
 use crate::pulse::{OUTER, RAYS};
 use crate::random::Stream;
@@ -61,35 +61,28 @@ impl<'a> Beam<'a> {
             echoes.push(self.stray(stream));
             return;
         }
-        let mut lit: [Option<Lit>; RAYS] = [None; RAYS];
-        lit[0] = self.ray(self.origin, direction, stream);
-        if self.spread == [0.0; 2] {
-            lit = [lit[0]; RAYS];
-        } else {
-            let [u, v] = across(direction);
-            let [cos, sin] = stream.direction();
-            for (slot, [p, q]) in
-                lit[1..].iter_mut().zip([[cos, sin], [-cos, -sin], [-sin, cos], [sin, -cos]])
-            {
-                let aside = along(u.map(|value| value * p), v, q);
-                let from = along(self.origin, aside, self.spread[1]);
-                *slot = self.ray(from, unit(along(direction, aside, self.spread[0])), stream);
-            }
+        let single = self.spread == [0.0; 2];
+        let rays = self.rays(direction, stream);
+        let range_m = self.params.max_range_m;
+        let radius = self.spread[1] + self.spread[0] * range_m;
+        let cast = if single { &rays[..1] } else { &rays[..] };
+        let mut hits = self.targets.hits(cast, radius, range_m);
+        if single {
+            hits = [hits[0]; RAYS];
         }
+        let lit = std::array::from_fn(|i| lit(hits[i]?, rays[i].direction, stream));
         self.group(lit, echoes);
     }
 
-    fn ray(&self, origin: Vec3, direction: Vec3, stream: &mut Stream) -> Option<Lit> {
-        let hit = self.targets.hit(origin, direction, self.params.max_range_m)?;
-        let reflectance = match hit.owner.label {
-            Label::Wood => WOOD_REFLECTANCE,
-            Label::Leaf | Label::Understorey | Label::Stray => LEAF_REFLECTANCE,
-            Label::Ground => GROUND_REFLECTANCE,
-        };
-        let incidence = dot(hit.normal, direction).abs();
-        let texture = (1.0 + TEXTURE * stream.bell()).max(0.2);
-        let light = reflectance * incidence * texture / RAYS as f64;
-        (hit.range >= NEAREST_M).then_some(Lit { hit, light })
+    /// The axis and four rays around it, turned at random.
+    fn rays(&self, direction: Vec3, stream: &mut Stream) -> [Ray; RAYS] {
+        let [u, v] = across(direction);
+        let [cos, sin] = stream.direction();
+        [[0.0, 0.0], [cos, sin], [-cos, -sin], [-sin, cos], [sin, -cos]].map(|[p, q]| {
+            let aside = along(u.map(|value| value * p), v, q);
+            let origin = along(self.origin, aside, self.spread[1]);
+            Ray { origin, direction: unit(along(direction, aside, self.spread[0])) }
+        })
     }
 
     /// Makes echoes of the ends of the rays: those within the mixing distance of the nearest one give
@@ -142,4 +135,17 @@ impl<'a> Beam<'a> {
         let owner = Owner { tree: 0, label: Label::Stray, cylinder: NO_CYLINDER };
         Echo { range, brightness: 0.02, owner, mixed: false }
     }
+}
+
+/// The light of the end of a ray; none for what is too near.
+fn lit(hit: RayHit, direction: Vec3, stream: &mut Stream) -> Option<Lit> {
+    let reflectance = match hit.owner.label {
+        Label::Wood => WOOD_REFLECTANCE,
+        Label::Leaf | Label::Understorey | Label::Stray => LEAF_REFLECTANCE,
+        Label::Ground => GROUND_REFLECTANCE,
+    };
+    let incidence = dot(hit.normal, direction).abs();
+    let texture = (1.0 + TEXTURE * stream.bell()).max(0.2);
+    let light = reflectance * incidence * texture / RAYS as f64;
+    (hit.range >= NEAREST_M).then_some(Lit { hit, light })
 }

@@ -76,6 +76,21 @@ impl Crown {
         }
     }
 
+    /// A thick branch of the stem, with a share of its cross-section.
+    pub(crate) fn limb(&mut self, stem: &Axis, height_m: f64, share: f64) {
+        let place = stem.place(height_m);
+        let depth = self.envelope.depth(place.at[2]).clamp(0.0, 1.0);
+        let [top, base] = self.habit.angle_deg;
+        let angle = 0.75 * (top + (base - top) * depth) + 4.0 * self.stream.normal();
+        let direction = from_axis(place.direction, 360.0 * self.stream.unit(), angle);
+        let radius = VIGOUR * place.radius * share.sqrt();
+        let limit = 1.2 * SLENDERNESS * libm::pow(radius, 2.0 / 3.0);
+        let length = self.envelope.room_m(place.at, direction, limit).max(0.5 * limit);
+        self.lowest_m = self.lowest_m.min(place.at[2]);
+        let (order, bare, alive) = (stem.order + 1, self.habit.bare, true);
+        self.branch(&Bud { place, order, direction, length, radius, bare, alive });
+    }
+
     /// Grows the dead branches of a conifer; returns where the crown begins on the leader.
     fn first_branch(&mut self, leader: &Axis, turn: &mut f64) -> f64 {
         let mut s = 0.0;

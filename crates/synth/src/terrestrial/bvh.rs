@@ -48,12 +48,14 @@ impl Bvh {
         self.nodes.first().map_or(Bounds3::EMPTY, |node| node.bounds)
     }
 
-    /// Visits the things whose boxes a ray enters before the range that `visit` gave last, near ones
-    /// first. `visit` gets a thing's number and returns the range of the nearest hit so far.
-    pub(crate) fn along_ray(
+    /// Visits the things whose boxes, grown by `radius` on all sides, a ray enters before the range
+    /// that `visit` gave last, near ones first. `visit` gets a thing's number and returns the range
+    /// beyond which nothing matters any more.
+    pub(crate) fn along_beam(
         &self,
         origin: Vec3,
         direction: Vec3,
+        radius: f64,
         mut limit: f64,
         mut visit: impl FnMut(u32) -> f64,
     ) {
@@ -64,7 +66,7 @@ impl Bvh {
             depth -= 1;
             let index = stack[depth];
             let node = &self.nodes[index as usize];
-            if !enters(&node.bounds, origin, inverse, limit) {
+            if !enters(&node.bounds, radius, origin, inverse, limit) {
                 continue;
             }
             if node.count > 0 {
@@ -145,13 +147,13 @@ fn divide(
     nodes[index] = Node { bounds, at: second, count: 0, axis: axis as u8 };
 }
 
-/// Whether a ray enters a box before a range (slabs; Kay and Kajiya 1986). A ray within a slab's face
+/// Whether a ray enters a box grown by a radius before a range (slabs; Kay and Kajiya 1986). A ray within a slab's face
 /// may give NaN, which counts as within.
-fn enters(bounds: &Bounds3, origin: Vec3, inverse: Vec3, limit: f64) -> bool {
+fn enters(bounds: &Bounds3, radius: f64, origin: Vec3, inverse: Vec3, limit: f64) -> bool {
     let (mut near, mut far) = (0.0_f64, limit);
     for axis in 0..3 {
-        let a = (bounds.min[axis] - origin[axis]) * inverse[axis];
-        let b = (bounds.max[axis] - origin[axis]) * inverse[axis];
+        let a = (bounds.min[axis] - radius - origin[axis]) * inverse[axis];
+        let b = (bounds.max[axis] + radius - origin[axis]) * inverse[axis];
         near = near.max(a.min(b));
         far = far.min(a.max(b));
     }
@@ -199,7 +201,7 @@ mod tests {
             let origin = [-9.0, 0.3, 0.2];
             let direction = super::super::vector::unit(super::super::vector::sub(towards, origin));
             let mut seen = Vec::new();
-            Bvh::build(&boxes(&balls)).along_ray(origin, direction, 40.0, |i| { seen.push(i); 40.0 });
+            Bvh::build(&boxes(&balls)).along_beam(origin, direction, 0.0, 40.0, |i| { seen.push(i); 40.0 });
             for (i, (c, r)) in balls.iter().enumerate() {
                 let from = super::super::vector::sub(*c, origin);
                 let t = super::super::vector::dot(from, direction);

@@ -35,9 +35,11 @@ pub fn grow(species: TreeSpecies, size: &TreeSize, seed: u64) -> Result<TreeMode
     let mut stream = Stream::new(seed, Domain::Growth, 0);
     let mut tree = Assembly::default();
     let habit = species.habit();
-    let stem = stem(size, habit, &mut stream, &mut tree);
+    let limbs = limbs(species, size, &mut stream);
+    let stem = stem(size, habit, &limbs, &mut stream, &mut tree);
     let second = size.fork_m.map(|fork| second_leader(&stem, fork, habit, &mut stream, &mut tree));
     let mut crown = Crown::new(species, size, &stem, stream, tree);
+    limbs.iter().for_each(|limb| crown.limb(&stem, limb.height_m, limb.share));
     crown.bear(&stem);
     if let Some(leader) = second {
         crown.bear(&leader);
@@ -53,14 +55,43 @@ pub fn grow(species: TreeSpecies, size: &TreeSize, seed: u64) -> Result<TreeMode
     })
 }
 
+/// A thick branch, for which the stem itself gets thinner.
+#[derive(Debug, Clone, Copy)]
+struct Limb {
+    height_m: f64,
+    /// Its share of the cross-section of the stem below.
+    share: f64,
+}
+
+/// The limbs of a broadleaved tree: some in the lower two thirds of its crown.
+fn limbs(species: TreeSpecies, size: &TreeSize, stream: &mut Stream) -> Vec<Limb> {
+    if species.is_conifer() {
+        return Vec::new();
+    }
+    let count = 3 + (3.0 * stream.unit()) as u32;
+    let crown_m = size.height_m - size.crown_base_m;
+    (0..count)
+        .map(|index| {
+            let rank = (f64::from(index) + stream.within(0.1, 0.9)) / f64::from(count);
+            let height_m = size.crown_base_m + 0.65 * rank * crown_m;
+            Limb { height_m, share: stream.within(0.18, 0.38) }
+        })
+        .collect()
+}
+
 /// The stem: a direction that starts at the lean, rights itself, and swings slightly to one side and
 /// back, followed node by node.
 fn stem(
     size: &TreeSize,
     habit: &BranchingHabit,
+    limbs: &[Limb],
     stream: &mut Stream,
     tree: &mut Assembly,
 ) -> Axis {
+    let fork = size.fork_m.map(|height_m| Limb { height_m, share: FORK_SHARE });
+    let left = |height: f64| -> f64 {
+        limbs.iter().chain(&fork).map(|limb| limb.left_of_radius(height)).product()
+    };
     let taper = StemTaper {
         breast_radius_m: 0.5 * size.dbh_m,
         length_m: size.height_m,
@@ -74,7 +105,7 @@ fn stem(
     let mut at: Vec3 = [0.0; 3];
     let mut nodes = Vec::with_capacity(heights.len());
     for (index, &height) in heights.iter().enumerate() {
-        let radius = taper.radius_m(height) * fork_factor(size, height);
+        let radius = (taper.radius_m(height) * left(height)).max(TIP_RADIUS_M);
         nodes.push(AxisNode { at, radius });
         if let Some(next) = heights.get(index + 1) {
             let share = 0.5 * (height + next) / size.height_m;
@@ -99,12 +130,12 @@ fn node_heights(height_m: f64) -> Vec<f64> {
     heights
 }
 
-/// What a fork leaves of the radius of the stem.
-fn fork_factor(size: &TreeSize, height: f64) -> f64 {
-    size.fork_m.map_or(1.0, |fork| {
-        let passed = ((height - fork) / FORK_LENGTH_M).clamp(0.0, 1.0);
-        1.0 + passed * ((1.0 - FORK_SHARE).sqrt() - 1.0)
-    })
+impl Limb {
+    /// What it leaves of the radius of the stem: the cross-sections are shared.
+    fn left_of_radius(&self, height: f64) -> f64 {
+        let passed = ((height - self.height_m) / FORK_LENGTH_M).clamp(0.0, 1.0);
+        1.0 + passed * ((1.0 - self.share).sqrt() - 1.0)
+    }
 }
 
 /// The other leader of a forked stem: leaves it at an angle and rises beside it.

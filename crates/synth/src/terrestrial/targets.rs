@@ -6,6 +6,7 @@ use super::ground_mesh::GroundMesh;
 use super::points::Label;
 use super::tree_model::TreeModel;
 use super::vector::{Vec3, sub};
+use crate::pulse::RAYS;
 use timberline_pointcloud::{Bounds3, Frame};
 
 /// Whose a thing is.
@@ -15,6 +16,13 @@ pub(crate) struct Owner {
     pub(crate) label: Label,
     /// Number of the piece of wood in its tree.
     pub(crate) cylinder: u32,
+}
+
+/// A ray of a beam; its direction is a unit vector.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ray {
+    pub(crate) origin: Vec3,
+    pub(crate) direction: Vec3,
 }
 
 /// Where a ray ends.
@@ -82,29 +90,38 @@ impl Targets {
         self.ground.as_ref().map_or(Bounds3::EMPTY, GroundMesh::bounds).union(&self.bvh.bounds())
     }
 
-    /// Where a ray from a local position ends, if within a range.
-    pub(crate) fn hit(&self, origin: Vec3, direction: Vec3, limit: f64) -> Option<RayHit> {
-        let mut best: Option<(f64, Vec3, u32)> = None;
-        self.bvh.along_ray(origin, direction, limit, |thing| {
-            let nearest = best.map_or(limit, |hit| hit.0);
-            let index = thing as usize;
-            let found = match self.solids.get(index) {
-                Some(solid) => solid.hit(origin, direction, nearest),
-                None => self.leaves[index - self.solids.len()].hit(origin, direction, nearest),
-            };
-            if let Some((range, normal)) = found {
-                best = Some((range, normal, thing));
+    /// Where the rays of a beam from local positions end, if within a range. The first ray is the axis;
+    /// no ray may be further than `radius` from it.
+    pub(crate) fn hits(&self, rays: &[Ray], radius: f64, limit: f64) -> [Option<RayHit>; RAYS] {
+        let mut best = [(limit, [0.0; 3], u32::MAX); RAYS];
+        let Some(axis) = rays.first() else { return [None; RAYS] };
+        self.bvh.along_beam(axis.origin, axis.direction, radius, limit, |thing| {
+            let mut farthest = 0.0_f64;
+            for (ray, nearest) in rays.iter().zip(&mut best) {
+                if let Some((range, normal)) = self.thing_hit(thing, ray, nearest.0) {
+                    *nearest = (range, normal, thing);
+                }
+                farthest = farthest.max(nearest.0);
             }
-            best.map_or(limit, |hit| hit.0)
+            farthest
         });
-        let limit = best.map_or(limit, |hit| hit.0);
-        let ground = self.ground.as_ref().and_then(|mesh| mesh.hit(origin, direction, limit));
-        let on_thing = best.map(|(range, normal, thing)| RayHit {
-            range,
-            normal,
-            owner: self.owners[thing as usize],
-        });
-        ground.map(|(range, normal)| RayHit { range, normal, owner: GROUND }).or(on_thing)
+        let mut hits = [None; RAYS];
+        for ((ray, (range, normal, thing)), hit) in rays.iter().zip(best).zip(&mut hits) {
+            let ground = self.ground.as_ref();
+            let ground = ground.and_then(|mesh| mesh.hit(ray.origin, ray.direction, range));
+            let owner = self.owners.get(thing as usize);
+            let on_thing = owner.map(|&owner| RayHit { range, normal, owner });
+            *hit = ground.map(|(range, normal)| RayHit { range, normal, owner: GROUND }).or(on_thing);
+        }
+        hits
+    }
+
+    fn thing_hit(&self, thing: u32, ray: &Ray, limit: f64) -> Option<(f64, Vec3)> {
+        let index = thing as usize;
+        match self.solids.get(index) {
+            Some(solid) => solid.hit(ray.origin, ray.direction, limit),
+            None => self.leaves[index - self.solids.len()].hit(ray.origin, ray.direction, limit),
+        }
     }
 }
 

@@ -95,11 +95,17 @@ impl TreeModel {
         self.stem_at(BREAST_HEIGHT_M).map_or(0.0, |(_, diameter)| diameter)
     }
 
-    /// Highest end of any piece above the foot, m.
+    /// Highest end of any piece, world, m.
+    #[must_use]
+    pub fn top_m(&self) -> [f64; 3] {
+        let ends = self.cylinders.iter().map(|piece| piece.end_m);
+        ends.fold(self.base_m, |top, end| if end[2] > top[2] { end } else { top })
+    }
+
+    /// Height of the highest end of any piece above the foot, m.
     #[must_use]
     pub fn height_m(&self) -> f64 {
-        let tops = self.cylinders.iter().map(|piece| piece.end_m[2].max(piece.start_m[2]));
-        tops.fold(self.base_m[2], f64::max) - self.base_m[2]
+        self.top_m()[2] - self.base_m[2]
     }
 
     /// Volume of a part, m³: the sum of its truncated cones.
