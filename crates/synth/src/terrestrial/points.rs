@@ -75,6 +75,21 @@ impl LabelledPoints {
         self.select(&kept)
     }
 
+    /// These points, then those of another scan of the same frame.
+    pub(crate) fn joined(mut self, other: &Self) -> Self {
+        let shift = self.cloud.frame.shift_from(&other.cloud.frame);
+        for index in 0..other.len() {
+            let at = other.cloud.local(index);
+            let at = std::array::from_fn(|axis| at[axis] + shift[axis]);
+            self.cloud.push_local(at, &other.cloud.point(index));
+        }
+        self.tree_id.extend_from_slice(&other.tree_id);
+        self.label.extend_from_slice(&other.label);
+        self.cylinder.extend_from_slice(&other.cylinder);
+        self.mixed.extend_from_slice(&other.mixed);
+        self
+    }
+
     /// The points of one scan position.
     #[must_use]
     pub fn of_station(&self, source_id: u16) -> Self {
