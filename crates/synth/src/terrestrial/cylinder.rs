@@ -266,17 +266,6 @@ impl Leaf {
         within.then(|| (t, scale(self.normal, -closing.signum())))
     }
 
-    /// Distance of a position from the blade's plane and rim, m (exact on the plane within it).
-    pub(crate) fn distance_m(&self, point: Vec3) -> f64 {
-        let from = sub(point, self.centre_m);
-        let out = dot(from, self.normal);
-        let side = super::vector::cross(self.normal, self.along);
-        let (p, q) = (dot(from, self.along), dot(from, side));
-        let scaled = libm::hypot(p / self.half_m[0], q / self.half_m[1]);
-        let beyond = if scaled > 1.0 { libm::hypot(p, q) * (1.0 - 1.0 / scaled) } else { 0.0 };
-        libm::hypot(out, beyond)
-    }
-
     pub(crate) fn moved(mut self, shift_m: Vec3) -> Self {
         self.centre_m = add(self.centre_m, shift_m);
         self
@@ -290,3 +279,7 @@ pub(crate) fn leaf(centre_m: Vec3, normal: Vec3, tip: Vec3, half_m: [f64; 2]) ->
     let along = if length(flat) > 1e-6 { unit(flat) } else { across(normal)[0] };
     Leaf { centre_m, along, normal, half_m }
 }
+
+#[cfg(test)]
+#[path = "cylinder/tests.rs"]
+mod tests;

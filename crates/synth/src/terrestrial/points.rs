@@ -33,7 +33,7 @@ pub struct LabelledPoints {
     pub label: Vec<Label>,
     /// The piece of wood in its tree, for points of wood; `u32::MAX` for others.
     pub cylinder: Vec<u32>,
-    /// Whether the range is a mean of surfaces more than 2 cm apart.
+    /// Whether the range is a mean of rays that end more than 2 cm apart.
     pub mixed: Vec<bool>,
     /// The scan positions.
     pub stations: Vec<Station>,
