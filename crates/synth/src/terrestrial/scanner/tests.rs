@@ -51,7 +51,7 @@ fn noise_is_along_the_beam_and_of_its_size() {
         }
     }
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    assert!(squares.len() > 300 && (rms - 0.004).abs() < 0.0006, "{rms} of {}", squares.len());
+    assert!(squares.len() > 200 && (rms - 0.004).abs() < 0.0006, "{rms} of {}", squares.len());
 }
 
 #[test]
@@ -94,17 +94,18 @@ fn one_sided_scans_show_less_than_half_of_a_stem() {
     assert!((12..23).contains(&seen), "{seen}");
 }
 
-/// Two posts, one 10 cm behind the edge of the other.
+/// Two posts, the edge of one before the middle of the other.
 #[test]
 fn pulses_on_an_edge_give_points_between_the_surfaces() {
     let mut pair = pole(2.0, 0.15, 0.15);
-    pair.cylinders.extend(pole(2.0, 0.15, 0.15).at([0.2, 0.12, 0.0]).cylinders);
-    let broad = ScanParams { divergence_mrad: 3.0, ..one_position(8.0) };
+    pair.cylinders.extend(pole(2.0, 0.15, 0.15).at([0.15, 0.15, 0.0]).cylinders);
+    let broad = ScanParams { divergence_mrad: 5.0, ..one_position(8.0) };
     let points = scan_tree(&pair, &broad, 1).unwrap();
     let off = |i: usize| pair.distance_m(points.cloud.world(i));
     let mixed: Vec<f64> = (0..points.len()).filter(|&i| points.mixed[i]).map(off).collect();
     assert!(mixed.len() > 20, "{}", mixed.len());
-    assert!(mixed.iter().filter(|&&distance| distance > 0.01).count() > 5);
+    let between = mixed.iter().filter(|&&distance| distance > 0.01).count();
+    assert!(between > 5, "{between} of {}", mixed.len());
     let sharp = scan_tree(&pair, &one_position(8.0).exact(), 1).unwrap();
     assert!(!sharp.mixed.contains(&true));
 }
