@@ -71,7 +71,11 @@ fn tile(points: &LabelledPoints, source_id: u16) -> SampleTile {
     }
     let rect: Rect = cloud.bounds().rect();
     let [dx, dy, _] = cloud.frame.origin_m.map(|value| value as f64);
-    SampleTile { name: format!("scans/position_{source_id}.laz"), rect: rect.moved([dx, dy]), cloud }
+    SampleTile {
+        name: format!("scans/position_{source_id}.laz"),
+        rect: rect.moved([dx, dy]),
+        cloud,
+    }
 }
 
 const CAMPAIGN_TOML: &str = r#"# A virtual terrestrial survey of a plot of 22 x 22 m: what `cargo xtask sample` wrote.

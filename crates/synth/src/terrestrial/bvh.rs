@@ -36,10 +36,8 @@ pub(crate) struct Bvh {
 impl Bvh {
     /// The hierarchy of the boxes of some things.
     pub(crate) fn build(boxes: &[Bounds3]) -> Self {
-        let centres: Vec<Vec3> = boxes
-            .iter()
-            .map(|b| std::array::from_fn(|i| 0.5 * (b.min[i] + b.max[i])))
-            .collect();
+        let centres: Vec<Vec3> =
+            boxes.iter().map(|b| std::array::from_fn(|i| 0.5 * (b.min[i] + b.max[i]))).collect();
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
         let mut build = Build { boxes, centres, nodes: Vec::with_capacity(boxes.len()) };
         if !boxes.is_empty() {
@@ -228,9 +226,8 @@ fn enters(bounds: &Bounds3, radius: f64, origin: Vec3, inverse: Vec3, limit: f64
 }
 
 fn distance_to_box(bounds: &Bounds3, point: Vec3) -> f64 {
-    let out = |axis: usize| {
-        (bounds.min[axis] - point[axis]).max(point[axis] - bounds.max[axis]).max(0.0)
-    };
+    let out =
+        |axis: usize| (bounds.min[axis] - point[axis]).max(point[axis] - bounds.max[axis]).max(0.0);
     let [x, y, z] = [out(0), out(1), out(2)];
     (x * x + y * y + z * z).sqrt()
 }
