@@ -118,8 +118,12 @@ fn particulars_show() {
     let forked = oak(usual.leafless().forked_at(1.8));
     let leader = forked.cylinders.iter().find(|piece| piece.order == 1).unwrap();
     assert!((leader.start_m[2] - 1.8).abs() < 0.2 && leader.start_radius_m > 0.08);
-    let length: f64 =
-        forked.cylinders.iter().filter(|p| p.branch == leader.branch).map(|p| p.length_m()).sum();
+    let length: f64 = forked
+        .cylinders
+        .iter()
+        .filter(|p| p.branch == leader.branch)
+        .map(TrueCylinder::length_m)
+        .sum();
     assert!(length > 0.8 * (forked.height_m() - 1.8));
 }
 
