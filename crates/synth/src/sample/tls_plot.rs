@@ -27,7 +27,7 @@ const DTM_CELL_M: f64 = 0.25;
 /// The sample's plot.
 ///
 /// # Errors
-/// None with the sample's own parameters; see [`plot`].
+/// None with the sample's own parameters; see [`plot()`].
 pub fn tls_plot_scene() -> Result<PlotScene, Error> {
     let scan = ScanParams { step_deg: STEP_DEG, max_range_m: 40.0, ..ScanParams::tls() };
     plot(SEED, &PlotParams { scan, ..PlotParams::default() })
@@ -36,7 +36,7 @@ pub fn tls_plot_scene() -> Result<PlotScene, Error> {
 /// The sample: thinned points of five scan positions, truth, and the campaign file.
 ///
 /// # Errors
-/// None with the sample's own parameters; see [`plot`].
+/// None with the sample's own parameters; see [`plot()`].
 pub fn tls_plot() -> Result<SampleStand, Error> {
     let scene = tls_plot_scene()?;
     let points = thinned(&scene, &scene.scan());
