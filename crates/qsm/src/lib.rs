@@ -1,0 +1,4 @@
+//! x
+pub mod fit;
+#[cfg(test)]
+mod testing;
