@@ -132,7 +132,8 @@ fn each_triple(len: usize, mut give: impl FnMut([usize; 3])) {
     }
     // Weyl sequences with the fractional parts of the plastic number's powers (Roberts 2018) fill
     // the cube evenly, the same for the same number of points.
-    const STEPS: [f64; 3] = [0.819_172_513_396_164_5, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
+    const STEPS: [f64; 3] =
+        [0.819_172_513_396_164_5, 0.671_043_606_703_789_2, 0.549_700_477_901_970_3];
     for trial in 1..=TRIPLES {
         let place = |step: f64| {
             let turn = 0.5 + step * trial as f64;
@@ -182,9 +183,7 @@ pub fn algebraic(points: impl Iterator<Item = ([f64; 2], f64)> + Clone) -> Optio
     let y = (m.yz * (m.xx - root) - m.xz * m.xy) / determinant / 2.0;
     let squared = x * x + y * y + m.xx + m.yy - 2.0 * root;
     let radius_m = squared.max(0.0).sqrt();
-    radius_m
-        .is_finite()
-        .then_some(Circle { centre_m: [mean[0] + x, mean[1] + y], radius_m })
+    radius_m.is_finite().then_some(Circle { centre_m: [mean[0] + x, mean[1] + y], radius_m })
 }
 
 fn weighted_mean(points: impl Iterator<Item = ([f64; 2], f64)>) -> Option<(f64, [f64; 2])> {

@@ -1,0 +1,146 @@
+//! From a skeleton and points to a model.
+
+use crate::assign::assign;
+use crate::axis::{Joints, buried_m, moved, rebuilt};
+use crate::branches::{Branch, split};
+use crate::measure::{Measured, Owned, measure, noise_of};
+use crate::pipe::PipeModel;
+use crate::points::Points;
+use crate::prune::{around, pruned};
+use crate::radii::{Given, Radius, radii};
+use crate::sections::{Sections, as_they_are, cut};
+use crate::{Error, Method, Model, ModelBranch, ModelCylinder, Params, RadiusSource, SkeletonNode};
+use timberline_solids::Cylinder;
+
+/// Most points that the first pass looks at: it only has to find out how thick branches are.
+const FIRST_PASS_POINTS: usize = 250_000;
+
+/// A model with what was learnt on the way.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Built {
+    /// The model.
+    pub model: Model,
+    /// The section, which is the cylinder, of every point.
+    pub owner: Vec<u32>,
+    /// What points scatter across surfaces, m; none where nothing was fitted.
+    pub noise_m: Option<f64>,
+    /// The tree's pipe model; none where nothing was fitted.
+    pub pipe: Option<PipeModel>,
+}
+
+/// Builds the model of a tree.
+///
+/// # Errors
+/// What is wrong with the skeleton.
+pub fn build(points: &Points, skeleton: &[SkeletonNode], params: &Params) -> Result<Built, Error> {
+    let branches = split(skeleton)?;
+    Ok(match params.method {
+        Method::Adtree => unfitted(points, &branches, params),
+        Method::Fitted => fitted(points, branches, params),
+    })
+}
+
+/// The skeleton's segments with its radii.
+fn unfitted(points: &Points, branches: &[Branch], params: &Params) -> Built {
+    let sections = as_they_are(branches, params);
+    let owner = assign(&points.points_m, &sections.all);
+    let radius = |section: &crate::sections::Section| Radius {
+        radius_m: section.radius_m,
+        sd_m: f64::NAN,
+        source: RadiusSource::Inferred,
+    };
+    let radii: Vec<Radius> = sections.all.iter().map(radius).collect();
+    let measured = vec![None; radii.len()];
+    let joints: Vec<Joints> = (0..branches.len()).map(|number| as_is(&sections, number)).collect();
+    let model = model(branches, &sections, &joints, &radii, &measured);
+    Built { model, owner, noise_m: None, pipe: None }
+}
+
+fn as_is(sections: &Sections, number: usize) -> Joints {
+    let pieces = &sections.all[sections.of(number)];
+    let first = pieces.first().map(|piece| piece.start_m);
+    let at_m = first.into_iter().chain(pieces.iter().map(|piece| piece.end_m)).collect();
+    Joints { at_m, fork: None, root_m: None }
+}
+
+/// What a pass finds.
+struct Pass {
+    sections: Sections,
+    owner: Vec<u32>,
+    measured: Vec<Option<Measured>>,
+    radii: Vec<Radius>,
+    joints: Vec<Joints>,
+    noise_m: Option<f64>,
+    pipe: Option<PipeModel>,
+}
+
+/// Cuts, assigns, fits, and finds radii and axes.
+fn pass(points: &Points, branches: &[Branch], noise_m: Option<f64>, params: &Params) -> Pass {
+    let sections = cut(branches, params);
+    let owner = assign(&points.points_m, &sections.all);
+    let owned = Owned::new(&points.points_m, points.wood.as_deref(), &owner, sections.all.len());
+    let measured = measure(&sections, &owned, noise_m, params);
+    let own_noise = noise_of(&measured).or(noise_m);
+    let noise = own_noise.unwrap_or(params.noise_m);
+    let given = Given { branches, sections: &sections, measured: &measured, noise_m: noise };
+    let (radii, pipe) = radii(&given, params);
+    let joints = moved(branches, &sections, &measured, &radii, &owned, noise);
+    Pass { sections, owner, measured, radii, joints, noise_m: own_noise, pipe }
+}
+
+/// Two passes: the first finds how thick branches are, whatever the skeleton says; the second fits
+/// sections of the right length along the corrected axes.
+fn fitted(points: &Points, branches: Vec<Branch>, params: &Params) -> Built {
+    let thinned = points.thinned(FIRST_PASS_POINTS);
+    let first = pass(&thinned, &branches, None, params);
+    let noise = first.noise_m.unwrap_or(params.noise_m);
+    let branches = rebuilt(&branches, &first.joints, &first.sections, &first.radii);
+    let mut branches = pruned(branches.clone(), &cut(&branches, params), noise);
+    let sections = cut(&branches, params);
+    for branch in &mut branches {
+        let Some(fork) = branch.fork else { continue };
+        branch.begin_m = buried_m(branch, around(&sections, fork.branch as usize, fork.at_m));
+    }
+    let second = pass(points, &branches, first.noise_m, params);
+    let Pass { sections, owner, measured, radii, joints, noise_m, pipe } = second;
+    let model = model(&branches, &sections, &joints, &radii, &measured);
+    Built { model, owner, noise_m, pipe }
+}
+
+/// Puts sections, axes and radii together.
+fn model(
+    branches: &[Branch],
+    sections: &Sections,
+    joints: &[Joints],
+    radii: &[Radius],
+    measured: &[Option<Measured>],
+) -> Model {
+    let mut model = Model::default();
+    for (number, branch) in branches.iter().enumerate() {
+        let range = sections.of(number);
+        let mut parent =
+            branch.fork.map(|fork| sections.at(fork.branch as usize, fork.at_m) as u32);
+        for (ends, place) in joints[number].at_m.windows(2).zip(range.clone()) {
+            let Radius { radius_m, sd_m, source } = radii[place];
+            let fit = measured[place].map(|measured| measured.fit);
+            let fit = fit.filter(|_| source == RadiusSource::Measured);
+            model.cylinders.push(ModelCylinder {
+                solid: Cylinder { start_m: ends[0], end_m: ends[1], radius_m },
+                radius_sd_m: sd_m,
+                source,
+                arc_coverage: fit.map_or(0.0, |fit| fit.arc_coverage),
+                points: fit.map_or(0, |fit| fit.points),
+                parent,
+                branch: number as u32,
+            });
+            parent = Some(place as u32);
+        }
+        model.branches.push(ModelBranch {
+            parent: branch.fork.map(|fork| fork.branch),
+            order: branch.order,
+            first: range.start as u32,
+            len: range.len() as u32,
+        });
+    }
+    model
+}
