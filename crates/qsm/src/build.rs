@@ -3,7 +3,7 @@
 use crate::assign::assign;
 use crate::axis::{Joints, buried_m, moved, rebuilt};
 use crate::branches::{Branch, split};
-use crate::measure::{Measured, Owned, measure, noise_of};
+use crate::measure::{Measured, Owned, measure, noise_of, noise_of_stem};
 use crate::pipe::PipeModel;
 use crate::points::Points;
 use crate::prune::{around, pruned};
@@ -79,8 +79,9 @@ fn pass(points: &Points, branches: &[Branch], noise_m: Option<f64>, params: &Par
     let sections = cut(branches, params);
     let owner = assign(&points.points_m, &sections.all);
     let owned = Owned::new(&points.points_m, points.wood.as_deref(), &owner, sections.all.len());
+    let noise_m = noise_of_stem(&sections, &owned, params).or(noise_m);
     let measured = measure(&sections, &owned, noise_m, params);
-    let own_noise = noise_of(&measured).or(noise_m);
+    let own_noise = noise_m.or_else(|| noise_of(&measured));
     let noise = own_noise.unwrap_or(params.noise_m);
     let given = Given { branches, sections: &sections, measured: &measured, noise_m: noise };
     let (radii, pipe) = radii(&given, params);

@@ -106,7 +106,7 @@ fn of_slices(
                 stem.iter().map(|(at, weight)| view.sample(*at, *weight)).collect();
             let window = WINDOW.0 * radius_m + WINDOW.1 * noise_m;
             let samples = within(samples, 0.5 * params.slice_m, window);
-            fit(&samples, &expected).filter(|fit| accepted(fit, params))
+            fit(&samples, &expected).filter(|fit| accepted(fit, None, params))
         })
         .collect();
     let found = combined(&fits)?;

@@ -20,6 +20,11 @@ const LEAST_ARC: f64 = 30.0 / 360.0;
 const LEAST_WEIGHT: f64 = 0.05;
 /// Weight of the noise before the tree has told its own, and after, in residuals.
 const NOISE_WEIGHT: [f64; 2] = [3.0, 8.0];
+/// Points of one section scatter at most this many times as much as those of the whole tree.
+const MOST_NOISE: f64 = 1.6;
+/// Expected noise of a thin branch as a share of the largest that can be measured, and the least, m.
+const NOISE_RADII: f64 = 0.75;
+const LEAST_NOISE_M: f64 = 0.0015;
 /// Fits with at least this many points, and radii of this many times their noise, tell the noise.
 const TELLING: (u32, f64) = (20, 3.0);
 
@@ -151,26 +156,48 @@ pub fn measure(
     noise_m: Option<f64>,
     params: &Params,
 ) -> Vec<Option<Measured>> {
-    (0..sections.all.len())
+    measure_some(sections, 0..sections.all.len(), owned, noise_m, params)
+}
+
+/// What points scatter across the surface of the tree, from its stem below half of its reach, where
+/// there is wood and little else; none where no section of it tells.
+#[must_use]
+pub fn noise_of_stem(sections: &Sections, owned: &Owned<'_>, params: &Params) -> Option<f64> {
+    let stem = sections.of(0);
+    let half = sections.all.first().map_or(0.0, |section| 0.5 * section.reach_m);
+    let lower = sections.all[stem.clone()].partition_point(|section| section.reach_m >= half);
+    noise_of(&measure_some(sections, stem.start..stem.start + lower, owned, None, params))
+}
+
+fn measure_some(
+    sections: &Sections,
+    places: std::ops::Range<usize>,
+    owned: &Owned<'_>,
+    noise_m: Option<f64>,
+    params: &Params,
+) -> Vec<Option<Measured>> {
+    places
         .into_par_iter()
         .map(|place| {
             let view = view(sections, place)?;
             let samples = samples(sections, place, &view, owned, noise_m.unwrap_or(params.noise_m));
             let expected = expected(&sections.all[place], noise_m, params);
             let fit = fit(&samples, &expected)?;
-            accepted(&fit, params).then_some(Measured { fit, view })
+            accepted(&fit, noise_m.map(|_| expected.noise_m), params)
+                .then_some(Measured { fit, view })
         })
         .collect()
 }
 
-/// What a fit of a section starts from.
+/// What a fit of a section starts from. The noise is that of the tree, most of which is bark; where
+/// that would hide the inside of a thin branch, only a branch with less can be measured at all.
 #[must_use]
 pub fn expected(section: &Section, noise_m: Option<f64>, params: &Params) -> Expected {
-    Expected {
-        radius_m: section.radius_m,
-        noise_m: noise_m.unwrap_or(params.noise_m),
-        noise_weight: NOISE_WEIGHT[usize::from(noise_m.is_some())],
-    }
+    let visible = NOISE_RADII * params.max_relative_noise * section.radius_m;
+    let noise_weight = NOISE_WEIGHT[usize::from(noise_m.is_some())];
+    let noise = noise_m.unwrap_or(params.noise_m);
+    let noise_m = noise.min(visible.max(LEAST_NOISE_M));
+    Expected { radius_m: section.radius_m, noise_m, noise_weight }
 }
 
 /// The points of a section and its neighbours on the branch that lie in its window.
@@ -205,10 +232,14 @@ pub fn within(mut samples: Vec<Sample>, half_m: f64, window_m: f64) -> Vec<Sampl
     if stride == 1 { samples } else { samples.into_iter().step_by(stride).collect() }
 }
 
-/// Whether a fit is that of a stem or branch.
+/// Whether a fit is that of a stem or branch: enough points on it, few in it, and not scattered more
+/// than those of the tree's surfaces are, nor so much that the inside could not be told from it.
 #[must_use]
-pub fn accepted(fit: &Fit, params: &Params) -> bool {
+pub fn accepted(fit: &Fit, noise_m: Option<f64>, params: &Params) -> bool {
+    let usual = noise_m.map_or(f64::INFINITY, |noise| MOST_NOISE * noise);
     fit.points >= params.min_points
+        && fit.noise_m <= usual
+        && fit.noise_m <= params.max_relative_noise * fit.radius_m
         && fit.radius_m >= params.min_radius_m
         && fit.radius_sd_m <= params.max_relative_sd * fit.radius_m
         && fit.inside_share <= params.max_inside_share

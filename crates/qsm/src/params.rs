@@ -42,6 +42,10 @@ pub struct Params {
     /// Largest standard error of a measured radius, as a share of it.
     #[schemars(range(min = 0.02, max = 0.6))]
     pub max_relative_sd: f64,
+    /// Largest scatter of the points across a measured surface, as a share of its radius: the points
+    /// of a ball of leaves scatter by a third of the radius of the circle through them.
+    #[schemars(range(min = 0.02, max = 1.0))]
+    pub max_relative_noise: f64,
     /// Most points inside a cylinder against those on its surface: wood is opaque.
     #[schemars(range(min = 0.0, max = 2.0))]
     pub max_inside_share: f64,
@@ -79,8 +83,9 @@ impl Default for Params {
             noise_m: 0.006,
             min_points: 6,
             max_relative_sd: 0.25,
+            max_relative_noise: 0.2,
             max_inside_share: 0.15,
-            min_surface_share: 0.35,
+            min_surface_share: 0.45,
             min_radius_m: 0.002,
             pipe_exponent: 1.1,
             breast_height_m: 1.3,

@@ -31,8 +31,9 @@ pub struct Evidence {
 
 /// Standard deviation of exponents between trees.
 const EXPONENT_SD: f64 = 0.25;
-/// Scatter that a law from few sections has at least.
-const LEAST_SCATTER: f64 = 0.2;
+/// Scatter of logarithms that a law has at least, from few sections, and at most: what lies farther
+/// away is no branch.
+const SCATTER: [f64; 2] = [0.2, 0.45];
 /// Rounds of weights.
 const ROUNDS: usize = 8;
 
@@ -53,9 +54,9 @@ impl PipeModel {
             .collect();
         let mut offsets: Vec<f64> = rows.iter().map(|[x, y, _]| y - exponent * x).collect();
         let mut line = [median(&mut offsets)?, exponent];
-        let mut scatter = LEAST_SCATTER;
+        let mut scatter = SCATTER[0];
         for _ in 0..ROUNDS {
-            scatter = spread(&rows, line).max(LEAST_SCATTER);
+            scatter = spread(&rows, line).clamp(SCATTER[0], SCATTER[1]);
             line = reweighted(&rows, line, scatter, exponent);
         }
         let [log_factor, exponent] = line;

@@ -28,6 +28,15 @@ const SHARING: f64 = 3.0;
 const MEMORY_RADII: f64 = 40.0;
 /// Scatter of radii around the skeleton's own where nothing was measured on the tree.
 const BLIND_SCATTER: f64 = 0.5;
+/// Sections of branches tell the pipe model when the logarithm of their radius is this near to the
+/// model of the stem.
+const OF_A_KIND: f64 = 1.0;
+/// A measured section of a branch is believed when a neighbour, at most so many sections away, has
+/// its radius, up to their errors and this share of it ...
+const NEIGHBOURS: usize = 2;
+const ALIKE: f64 = 0.15;
+/// ... or when it shows so much of itself: points and part of the circumference.
+const ALONE: (u32, f64) = (20, 0.4);
 /// Fits that tell the pipe model: radius over noise, and standard error over radius.
 const TELLING: (f64, f64) = (3.0, 0.15);
 
@@ -58,7 +67,7 @@ pub struct Given<'a> {
 /// Radii of all sections, and the pipe model where anything was measured.
 #[must_use]
 pub fn radii(given: &Given<'_>, params: &Params) -> (Vec<Radius>, Option<PipeModel>) {
-    let pipe = PipeModel::of(&evidence(given), params.pipe_exponent);
+    let pipe = pipe_model(given, params);
     let mut found: Vec<Radius> = Vec::with_capacity(given.sections.all.len());
     for number in 0..given.branches.len() {
         let parent = given.branches[number].fork.map(|fork| {
@@ -70,15 +79,41 @@ pub fn radii(given: &Given<'_>, params: &Params) -> (Vec<Radius>, Option<PipeMod
     (found, pipe)
 }
 
-/// The sections that tell the pipe model, thick against the noise.
-fn evidence(given: &Given<'_>) -> Vec<Evidence> {
+/// The pipe model: first of the stem, whose lower half is wood beyond doubt, then also of those
+/// sections of branches that are of its kind.
+fn pipe_model(given: &Given<'_>, params: &Params) -> Option<PipeModel> {
+    let rows = evidence(given);
+    let half = given.sections.all.first().map_or(0.0, |section| 0.5 * section.reach_m);
+    let lower = |row: &&(Evidence, u32)| row.1 == 0 && row.0.reach_m >= half;
+    let mut stem: Vec<Evidence> = rows.iter().filter(lower).map(|row| row.0).collect();
+    let Some(first) = PipeModel::of(&stem, params.pipe_exponent) else {
+        let all: Vec<Evidence> = rows.iter().map(|row| row.0).collect();
+        return PipeModel::of(&all, params.pipe_exponent);
+    };
+    let of_a_kind = |row: &&(Evidence, u32)| {
+        let ratio = libm::log(row.0.radius_m / first.radius_m(row.0.reach_m));
+        row.1 != 0 && ratio.abs() <= OF_A_KIND
+    };
+    let sides: Vec<Evidence> = rows.iter().filter(of_a_kind).map(|row| row.0).collect();
+    // The stem is one branch among many, however many sections it has.
+    let weight: f64 = sides.iter().map(|row| row.weight).sum();
+    let of_stem: f64 = stem.iter().map(|row| row.weight).sum();
+    let share = (weight / of_stem).clamp(0.1, 1.0);
+    stem.iter_mut().for_each(|row| row.weight *= share);
+    stem.extend(sides);
+    PipeModel::of(&stem, params.pipe_exponent)
+}
+
+/// The sections that tell the pipe model, thick against the noise, and their branches.
+fn evidence(given: &Given<'_>) -> Vec<(Evidence, u32)> {
     let pairs = given.sections.all.iter().zip(given.measured);
     let rows = pairs.filter_map(|(section, measured)| {
         let fit = measured.as_ref()?.fit;
         let telling =
-            fit.radius_m > TELLING.0 * given.noise_m && fit.radius_sd_m < TELLING.1 * fit.radius_m;
+            fit.radius_m > TELLING.0 * fit.noise_m && fit.radius_sd_m < TELLING.1 * fit.radius_m;
         let weight = section.length_m();
-        telling.then_some(Evidence { reach_m: section.reach_m, radius_m: fit.radius_m, weight })
+        let row = Evidence { reach_m: section.reach_m, radius_m: fit.radius_m, weight };
+        telling.then_some((row, section.branch))
     });
     rows.collect()
 }
@@ -95,6 +130,8 @@ struct Known {
     /// Logarithm of the radius over that of the pipe model, and its standard deviation.
     log_ratio: f64,
     log_sd: f64,
+    points: u32,
+    arc_coverage: f64,
 }
 
 /// Radii of one branch; `parent` is radius and standard error of the branch below at the fork.
@@ -144,7 +181,7 @@ fn plausible(
     let range = given.sections.of(number);
     let rows = given.sections.all[range.clone()].iter().zip(&given.measured[range]).enumerate();
     let common = COMMON_NOISE * given.noise_m;
-    rows.filter_map(|(place, (section, measured))| {
+    let rows = rows.filter_map(|(place, (section, measured))| {
         let fit = measured.as_ref()?.fit;
         let rough = ROUNDNESS * fit.radius_m;
         let sd_m = libm::sqrt(fit.radius_sd_m * fit.radius_sd_m + rough * rough + common * common);
@@ -157,13 +194,30 @@ fn plausible(
             sd_m,
             log_ratio,
             log_sd,
+            points: fit.points,
+            arc_coverage: fit.arc_coverage,
         };
         let Some((below, below_sd)) = parent else { return Some(known) };
         let allowed = TOO_FAR * libm::sqrt(scatter * scatter + log_sd * log_sd);
         let wider = TOO_FAR * libm::sqrt(sd_m * sd_m + below_sd * below_sd);
         (log_ratio.abs() <= allowed && fit.radius_m <= below + wider).then_some(known)
+    });
+    let found: Vec<Known> = rows.collect();
+    if parent.is_none() {
+        return found;
+    }
+    let shows = |known: &Known| known.points >= ALONE.0 && known.arc_coverage >= ALONE.1;
+    found.iter().filter(|known| shows(known) || has_like(known, &found)).copied().collect()
+}
+
+/// Whether a neighbour along the branch has about the same radius.
+fn has_like(known: &Known, all: &[Known]) -> bool {
+    all.iter().any(|other| {
+        let apart = other.place.abs_diff(known.place);
+        let off = (other.radius_m - known.radius_m).abs();
+        let error = libm::hypot(other.sd_m, known.sd_m);
+        (1..=NEIGHBOURS).contains(&apart) && off <= 2.0 * error + ALIKE * known.radius_m
     })
-    .collect()
 }
 
 /// Takes out what neighbours along the branch contradict, and puts the fitted radii in place of the
