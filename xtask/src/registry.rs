@@ -8,7 +8,8 @@ use timberline_export::stage::ExportStage;
 use timberline_ground::stage::{DtmStage, GroundStage};
 use timberline_ingest::stage::{Scatter, Tiles};
 use timberline_report::stage::MapStage;
-use timberline_segmentation::stage::SegmentationStage;
+use timberline_segmentation::stage::{SegmentationStage, TreeLabelsStage};
+use timberline_stems::stage::{StemsStage, TreeCloudStage};
 use timberline_treetops::stage::TreetopsStage;
 
 /// A stage without its types.
@@ -49,6 +50,9 @@ impl Registry {
             erase::<DetectionStage>(),
             erase::<SegmentationStage>(),
             erase::<CrownFitStage>(),
+            erase::<StemsStage>(),
+            erase::<TreeLabelsStage>(),
+            erase::<TreeCloudStage>(),
             erase::<ExportStage>(),
             erase::<MapStage>(),
         ])

@@ -15,8 +15,17 @@ mod architecture {
     use std::path::{Path, PathBuf};
 
     /// Side by side: none knows another.
-    const STAGE_CRATES: [&str; 8] =
-        ["ingest", "ground", "treetops", "segmentation", "crowns", "export", "report", "evaluate"];
+    const STAGE_CRATES: [&str; 9] = [
+        "ingest",
+        "ground",
+        "treetops",
+        "segmentation",
+        "crowns",
+        "stems",
+        "export",
+        "report",
+        "evaluate",
+    ];
 
     /// What stage crates may know.
     const BELOW: [&str; 4] = ["pointcloud", "boosting", "solids", "artefact"];

@@ -15,7 +15,7 @@ pub enum UnitKind {
     File,
     /// One tile of the campaign's grid.
     Tile,
-    /// One tree, named by a campaign stage in [`Facts::trees`].
+    /// One tree, named by an earlier stage in [`Facts::trees`].
     Tree,
     /// The whole campaign.
     Campaign,
@@ -142,7 +142,7 @@ pub struct Facts {
     pub counts: BTreeMap<String, u64>,
     /// The tiles for which a file's shards hold points, sorted.
     pub parts: Vec<TileId>,
-    /// The trees a campaign stage found, sorted by id: the units of stages that work on trees.
+    /// The trees in it, sorted by id: the units of stages that work on trees.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub trees: Vec<TreeUnit>,
 }
@@ -156,6 +156,18 @@ pub struct TreeUnit {
     pub points: u64,
     /// World bounds of its points, m.
     pub bounds: Bounds3,
+}
+
+impl TreeUnit {
+    /// The same tree with another part of its points.
+    #[must_use]
+    pub fn with(&self, part: &Self) -> Self {
+        Self {
+            tree_id: self.tree_id,
+            points: self.points + part.points,
+            bounds: self.bounds.union(&part.bounds),
+        }
+    }
 }
 
 impl Facts {

@@ -154,6 +154,6 @@ fn tile_facts(gathered: &Gathered, grid: TileGrid) -> Facts {
         }),
         grid: Some(grid),
         counts: counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
-        parts: Vec::new(),
+        ..Facts::default()
     }
 }

@@ -75,6 +75,15 @@ impl TileGrid {
         Rect { min: [x, y], max: [x + edge, y + edge] }
     }
 
+    /// The tiles that a closed rectangle touches, sorted.
+    #[must_use]
+    pub fn tiles_touching(&self, rect: &Rect) -> Vec<TileId> {
+        let low = self.tile_at(rect.min[0], rect.min[1]);
+        let high = self.tile_at(rect.max[0], rect.max[1]);
+        let columns = low.ix..=high.ix;
+        columns.flat_map(|ix| (low.iy..=high.iy).map(move |iy| TileId { ix, iy })).collect()
+    }
+
     /// The tiles whose rectangle comes within `halo_m` of the given tile's, itself included, sorted.
     #[must_use]
     pub fn neighbours(&self, tile: TileId, halo_m: f64) -> Vec<TileId> {

@@ -27,6 +27,6 @@ pub use chm::{Chm, PitFree};
 pub use claim::{Claim, Crown, label};
 pub use error::Error;
 pub use methods::{Li, LiParams, Ncut, NcutParams, RasterSegmenter, Seed, Segments, StarSac};
-pub use params::{Membership, SegmentMethod, SegmentationParams};
+pub use params::{Membership, SegmentMethod, SegmentationParams, TreeLabelsParams};
 pub use segmenter::{Marker, Piece, Segmenter, View, segmenter};
 pub use surface::surface_scores;

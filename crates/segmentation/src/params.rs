@@ -1,7 +1,11 @@
 //! Parameters of the stage.
 
+mod tree_labels;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+
+pub use tree_labels::TreeLabelsParams;
 
 /// Which points belong to a tree.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]

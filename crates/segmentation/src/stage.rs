@@ -1,6 +1,7 @@
 //! The stage `segmentation`: the only place here that reads and writes artefacts.
 
 mod program;
+mod tree_labels;
 
 use crate::blocks::{room_m, segment_in_blocks, sort_markers};
 use crate::{Claim, Crown, Marker, SegmentationParams, Segmenter, View, segmenter};
@@ -12,6 +13,8 @@ use timberline_artefact::stage::{
 };
 use timberline_artefact::{Aligned, Error, Kind, Surroundings, UnitKind, gather, read_header};
 use timberline_pointcloud::{Frame, Rect};
+
+pub use tree_labels::TreeLabelsStage;
 
 /// The tree of every point, by the method that the parameters name.
 #[derive(Debug, Clone, Copy)]
@@ -54,17 +57,11 @@ impl Stage for SegmentationStage {
     }
 
     fn files(params: &Self::Params) -> Vec<NamedFile> {
-        let files = crate::hook::named_files(&params.command).into_iter();
-        files.map(|(name, required)| NamedFile { name, param: "command", required }).collect()
+        files_of(&params.command)
     }
 
     fn memory_bytes(params: &Self::Params, points: u64) -> u64 {
-        const BYTES_PER_POINT: u64 = 300;
-        let program = match params.command.is_empty() {
-            true => 0,
-            false => u64::from(params.command_memory_limit_mb) * 1_000_000,
-        };
-        points * BYTES_PER_POINT + program
+        memory_of(&params.command, params.command_memory_limit_mb, points)
     }
 
     fn run(
@@ -74,7 +71,17 @@ impl Stage for SegmentationStage {
     ) -> Result<(), StageError> {
         let (all, claims) = match params.command.is_empty() {
             true => built_in(params, inputs, context)?,
-            false => program::claims(params, inputs, context)?,
+            false => {
+                let hooked = program::Hooked {
+                    command: &params.command,
+                    halo_m: params.command_halo_m,
+                    reach_m: params.reach_m,
+                    time_limit_s: params.command_time_limit_s,
+                    memory_limit_mb: params.command_memory_limit_mb,
+                };
+                let markers = |rect: &Rect, frame: &Frame| markers(inputs, rect, frame);
+                program::claims_by_program(&hooked, inputs, context, markers)?
+            }
         };
         context.advance(all.own_len as u64);
         let claims = all.own_values(&claims);
@@ -83,6 +90,19 @@ impl Stage for SegmentationStage {
         context.emit(&labels(&claims), facts)?;
         Ok(())
     }
+}
+
+/// The files that the words of a program name.
+fn files_of(command: &[String]) -> Vec<NamedFile> {
+    let files = crate::hook::named_files(command).into_iter();
+    files.map(|(name, required)| NamedFile { name, param: "command", required }).collect()
+}
+
+/// Peak memory of a task, bytes, with that of a program.
+fn memory_of(command: &[String], limit_mb: u32, points: u64) -> u64 {
+    const BYTES_PER_POINT: u64 = 300;
+    let program = if command.is_empty() { 0 } else { u64::from(limit_mb) * 1_000_000 };
+    points * BYTES_PER_POINT + program
 }
 
 /// The tree of every point of a tile and its surroundings, by the method that the parameters name.

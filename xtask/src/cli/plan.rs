@@ -37,6 +37,9 @@ pub struct StageLine {
     pub memory_bytes: u64,
     /// Causes with the number of units of each, the commonest first.
     pub why: Vec<(usize, String)>,
+    /// The stage that must run before the units are known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub units_known_after: Option<&'static str>,
 }
 
 /// Runs the command.
@@ -78,6 +81,7 @@ pub fn lines(opened: &Opened) -> Result<Vec<StageLine>> {
             to_run: units.len() - up_to_date,
             memory_bytes: stale.map(|plan| plan.memory_bytes).max().unwrap_or(0),
             why: causes(&dry.explain(position)),
+            units_known_after: dry.units_known_after(position),
         }
     };
     Ok((0..dry.stages.len()).map(line).collect())
@@ -109,13 +113,18 @@ fn table(lines: &[StageLine]) -> Table {
             1 => words.clone(),
             _ => format!("{count}: {words}"),
         });
+        let count = |count: usize| match line.units_known_after {
+            Some(_) => "?".to_owned(),
+            None => count.to_string(),
+        };
+        let unknown = |stage| format!("its trees are known once `{stage}` has run");
         table.row([
             line.stage.clone(),
-            line.units.to_string(),
-            line.up_to_date.to_string(),
-            line.to_run.to_string(),
+            count(line.units),
+            count(line.up_to_date),
+            count(line.to_run),
             memory,
-            why.next().unwrap_or_default(),
+            line.units_known_after.map_or_else(|| why.next().unwrap_or_default(), unknown),
         ]);
         let empty = || std::iter::repeat_n(String::new(), 5);
         why.by_ref().take(3).for_each(|words| table.row(empty().chain([words])));

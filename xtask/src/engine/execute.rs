@@ -493,6 +493,7 @@ fn made_of(plan: &UnitPlan, ended: Option<&Ended>) -> Made {
         standing: if there.is_some() { Standing::Ready } else { Standing::Absent },
         points: there.map_or(0, |ended| ended.known.points),
         parts: there.map(|ended| ended.known.parts.clone()).unwrap_or_default(),
+        trees: there.map(|ended| ended.known.trees.clone()).unwrap_or_default(),
     }
 }
 

@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::cell::{OnceCell, RefCell};
 use std::collections::BTreeMap;
 use std::path::Path;
-use timberline_artefact::{Header, InputRef, UnitId, kinds};
+use timberline_artefact::{Header, InputRef, UnitId, UnitKind, kinds};
 
 /// A difference between two keys of one unit.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -157,6 +157,17 @@ impl<'a> DryRun<'a> {
         Ok(Self { pipeline, store, stages, entries, roots: RefCell::default() })
     }
 
+    /// The stage that must run before the units of a stage are known: the last one before the trees.
+    #[must_use]
+    pub fn units_known_after(&self, position: usize) -> Option<&'static str> {
+        let info = |at: usize| self.pipeline.stages[at].stage.info();
+        let will_run = |at: &usize| {
+            info(*at).unit != UnitKind::Tree && self.stages[*at].iter().any(|plan| !plan.is_whole())
+        };
+        let asks = info(position).unit == UnitKind::Tree;
+        (0..position).rev().find(will_run).filter(|_| asks).map(|at| info(at).name)
+    }
+
     fn entries(&self, position: usize) -> &Entries {
         let list = || self.store.entries(self.pipeline.stages[position].name());
         self.entries[position].get_or_init(list)
@@ -216,14 +227,21 @@ impl<'a> DryRun<'a> {
 }
 
 fn assumed(plan: &UnitPlan) -> Made {
-    let (standing, points, parts) = match &plan.found {
-        Found::Whole(known) => (Standing::Ready, known.points, known.parts.clone()),
+    let key = plan.task.key.clone();
+    let (points, parts, trees) = (plan.points, plan.expected_parts.clone(), Vec::new());
+    match &plan.found {
+        Found::Whole(known) => Made {
+            key,
+            standing: Standing::Ready,
+            points: known.points,
+            parts: known.parts.clone(),
+            trees: known.trees.clone(),
+        },
         _ if plan.absent.is_empty() => {
-            (Standing::WillRun, plan.points, plan.expected_parts.clone())
+            Made { key, standing: Standing::WillRun, points, parts, trees }
         }
-        _ => (Standing::Absent, 0, Vec::new()),
-    };
-    Made { key: plan.task.key.clone(), standing, points, parts }
+        _ => Made { key, standing: Standing::Absent, points: 0, parts: Vec::new(), trees },
+    }
 }
 
 fn cause(stage: &PipelineStage, plan: &UnitPlan, entries: &Entries) -> Cause {

@@ -15,7 +15,7 @@ use std::sync::Arc;
 use timberline_artefact::container::CONTAINER_VERSION;
 use timberline_artefact::kinds;
 use timberline_artefact::stage::{InputFile, InputSpec, RawFile, Scope, Task};
-use timberline_artefact::{InputRef, UnitId, UnitKind};
+use timberline_artefact::{InputRef, TreeUnit, UnitId, UnitKind};
 use timberline_pointcloud::TileId;
 
 /// Where a unit of an earlier stage stands.
@@ -40,6 +40,8 @@ pub struct Made {
     pub points: u64,
     /// Tiles it holds points for (raw files).
     pub parts: Vec<TileId>,
+    /// Trees it names as units of work, with what it holds of each.
+    pub trees: Vec<TreeUnit>,
 }
 
 /// The units of the stages before, by position in the pipeline.
@@ -138,6 +140,8 @@ struct Planner<'a> {
     named: Arc<[Named]>,
     /// The raw files with points in a tile, for every stage before that works on raw files.
     by_tile: BTreeMap<usize, BTreeMap<TileId, Vec<Source<'a>>>>,
+    /// The trees, as the last stage before that names some does.
+    trees: BTreeMap<u64, TreeUnit>,
 }
 
 /// A unit of an earlier stage.
@@ -155,8 +159,17 @@ impl<'a> Planner<'a> {
         let halo_m = stage.stage.halo_m(&stage.params);
         let by_tile = BTreeMap::new();
         let named = stage.files.iter().map(|(name, path)| Named::look(name, path)).collect();
-        let mut planner =
-            Self { pipeline, position, survey, store, before, halo_m, named, by_tile };
+        let mut planner = Self {
+            pipeline,
+            position,
+            survey,
+            store,
+            before,
+            halo_m,
+            named,
+            by_tile,
+            trees: trees(before),
+        };
         let froms: BTreeSet<usize> = planner.inputs().map(|(_, from)| from).collect();
         for from in froms {
             if planner.kind_of(from) != UnitKind::File {
@@ -195,6 +208,7 @@ impl<'a> Planner<'a> {
             }
             UnitKind::Campaign => vec![UnitId::Campaign],
             UnitKind::Tile => self.tiles().into_iter().map(UnitId::Tile).collect(),
+            UnitKind::Tree => self.trees.keys().map(|tree| UnitId::Tree(*tree)).collect(),
         }
     }
 
@@ -232,8 +246,9 @@ impl<'a> Planner<'a> {
         }));
         draft.refs.sort();
         let most = |points: &BTreeMap<_, u64>| points.values().copied().max().unwrap_or(0);
-        let in_file = file.map(|file| file.facts.points);
-        let (read, points) = match in_file {
+        let of_tree = unit.tree().and_then(|tree| self.trees.get(&tree)).map(|tree| tree.points);
+        let known = file.map(|file| file.facts.points).or(of_tree);
+        let (read, points) = match known {
             Some(points) => (points, points),
             None => (most(&draft.points), most(&draft.own_points)),
         };
@@ -272,6 +287,9 @@ impl<'a> Planner<'a> {
         halo_m: f64,
     ) -> Vec<Source<'a>> {
         let all = &self.before[from];
+        if let Some(tree) = unit.tree().filter(|_| spec.scope != Scope::All) {
+            return self.sources_of_tree(tree, all);
+        }
         let Some(tile) = unit.tile().filter(|_| spec.scope != Scope::All) else {
             let everything = *unit == UnitId::Campaign || spec.scope == Scope::All;
             return match everything {
@@ -292,6 +310,20 @@ impl<'a> Planner<'a> {
         let campaign = all.get_key_value(&UnitId::Campaign);
         let tiles = near.into_iter().filter_map(|tile| all.get_key_value(&UnitId::Tile(tile)));
         tiles.chain(campaign).collect()
+    }
+
+    /// What a tree reads of an earlier stage: its own, that of the campaign, and that of the tiles
+    /// it reaches into.
+    fn sources_of_tree(&self, tree: u64, all: &'a BTreeMap<UnitId, Made>) -> Vec<Source<'a>> {
+        let own = [UnitId::Tree(tree), UnitId::Campaign];
+        let own = own.iter().filter_map(|unit| all.get_key_value(unit)).collect::<Vec<_>>();
+        let (Some(tree), Some(grid), true) =
+            (self.trees.get(&tree), self.survey.campaign.grid, own.is_empty())
+        else {
+            return own;
+        };
+        let tiles = grid.tiles_touching(&tree.bounds.rect());
+        tiles.into_iter().filter_map(|tile| all.get_key_value(&UnitId::Tile(tile))).collect()
     }
 
     fn take(
@@ -346,6 +378,19 @@ impl<'a> Planner<'a> {
             add(CRS, UnitId::Campaign, format!("{} ({})", crs.name, &hash[..8]));
         }
     }
+}
+
+/// The trees that the last stage to name some does; what several of its units hold of one tree is
+/// put together.
+fn trees(before: &Progressed) -> BTreeMap<u64, TreeUnit> {
+    let mut trees: BTreeMap<u64, TreeUnit> = BTreeMap::new();
+    let names_some = |units: &&BTreeMap<UnitId, Made>| units.values().any(|m| !m.trees.is_empty());
+    let named = before.iter().rev().find(names_some);
+    for tree in named.iter().flat_map(|units| units.values()).flat_map(|made| &made.trees) {
+        let part = trees.entry(tree.tree_id);
+        part.and_modify(|known| *known = known.with(tree)).or_insert(*tree);
+    }
+    trees
 }
 
 #[derive(Default)]

@@ -7,22 +7,24 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{self, Outputs};
 use timberline_artefact::stage::{StageInfo, artefact_path};
-use timberline_artefact::{Header, Kind, Opened, UnitId};
+use timberline_artefact::{Header, Kind, Opened, TreeUnit, UnitId};
 use timberline_pointcloud::TileId;
 
 /// What the engine needs to know of an artefact that is whole.
-#[derive(Debug, Clone, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct Known {
     /// Points in it.
     pub points: u64,
     /// Tiles it holds points for.
     pub parts: Vec<TileId>,
+    /// Trees it names as units of work.
+    pub trees: Vec<TreeUnit>,
     /// Number of its warnings.
     pub warnings: usize,
 }
 
 /// Whether the store has a unit of a stage under a key.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Found {
     /// All its artefacts are there and whole; what they say together.
     Whole(Known),
@@ -115,6 +117,7 @@ impl Store {
         let known = Known {
             points: header.facts.counts.get("points").copied().unwrap_or(0),
             parts: header.facts.parts,
+            trees: header.facts.trees,
             warnings: header.warnings.len(),
         };
         self.notes.put(path, stamp, known.clone());
@@ -183,6 +186,7 @@ fn merge(a: Known, b: Known) -> Known {
     Known {
         points: a.points.max(b.points),
         parts: if a.parts.is_empty() { b.parts } else { a.parts },
+        trees: if a.trees.is_empty() { b.trees } else { a.trees },
         warnings: a.warnings.max(b.warnings),
     }
 }

@@ -57,10 +57,7 @@ impl Surveyed {
     /// The tiles its extent touches: at least those it has points in.
     #[must_use]
     pub fn tiles(&self, grid: &TileGrid) -> Vec<TileId> {
-        let Some(Rect { min, max }) = self.facts.rect_m else { return Vec::new() };
-        let (low, high) = (grid.tile_at(min[0], min[1]), grid.tile_at(max[0], max[1]));
-        let columns = low.ix..=high.ix;
-        columns.flat_map(|ix| (low.iy..=high.iy).map(move |iy| TileId { ix, iy })).collect()
+        self.facts.rect_m.map(|rect| grid.tiles_touching(&rect)).unwrap_or_default()
     }
 }
 
