@@ -1,7 +1,7 @@
 //! One tree from one skeleton, or from the better of two.
 
 use crate::build::{Built, build};
-use crate::distances::{cloud_to_model, model_to_cloud};
+use crate::distances::{cloud_to_model, model_to_cloud, unseen_cylinders};
 use crate::measure::Owned;
 use crate::metrics::metrics;
 use crate::points::Points;
@@ -98,6 +98,7 @@ fn modelled(
     Ok(ModelledTree {
         cloud_to_model: cloud_to_model(&points.points_m, &model),
         model_to_cloud: model_to_cloud(&points.points_m, &owner, &model)?,
+        unseen_cylinders: unseen_cylinders(&owner, &model),
         model,
         metrics,
         noise_m,

@@ -46,6 +46,7 @@ pub mod points;
 pub mod prune;
 pub mod radii;
 pub mod sections;
+pub mod stage;
 #[cfg(test)]
 mod testing;
 #[cfg(test)]

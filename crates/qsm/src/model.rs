@@ -107,6 +107,8 @@ pub struct ModelledTree {
     pub cloud_to_model: DistanceSummary,
     /// From the model's surface, as far as it could be seen, to the nearest point.
     pub model_to_cloud: DistanceSummary,
+    /// Number of cylinders that no point belongs to.
+    pub unseen_cylinders: usize,
     /// Standard deviation of the points across the surface of wood, m; none where nothing was fitted.
     pub noise_m: Option<f64>,
     /// Relation of radius and reach that the measured sections of this tree show.

@@ -94,6 +94,25 @@ impl KdTree {
         }
     }
 
+    /// Fills `found` with all points within a distance, in the order of the tree.
+    pub(crate) fn within(&self, at: &Vector, radius: f64, found: &mut Vec<u32>) {
+        found.clear();
+        let most = radius * radius;
+        let mut stack = vec![0u32];
+        while let Some(place) = stack.pop() {
+            let node = &self.nodes[place as usize];
+            if node.squared_to(at) > most {
+                continue;
+            }
+            if node.left == 0 {
+                let own = node.start as usize..node.end as usize;
+                found.extend(own.filter(|&i| squared(self.points[i], *at) <= most).map(|i| self.index[i]));
+            } else {
+                stack.extend([node.left + 1, node.left]);
+            }
+        }
+    }
+
     fn scan(&self, node: &Node, at: &Vector, own: u32, count: usize, found: &mut Vec<Near>) {
         for i in node.start as usize..node.end as usize {
             let new = (squared(self.points[i], *at), self.index[i]);
@@ -207,6 +226,12 @@ mod tests {
                 all.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
                 all.truncate(count);
                 prop_assert_eq!(&found, &all);
+                let mut near = Vec::new();
+                tree.within(at, 2.0, &mut near);
+                near.sort_unstable();
+                let inside = |j: &u32| squared(points[*j as usize], *at) <= 4.0;
+                let all: Vec<u32> = (0..points.len() as u32).filter(inside).collect();
+                prop_assert_eq!(near, all);
             }
         }
     }

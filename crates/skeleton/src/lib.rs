@@ -26,6 +26,7 @@
 //! # Ok::<(), timberline_skeleton::Error>(())
 //! ```
 
+pub mod adtree;
 mod base;
 pub mod cloud;
 pub mod error;
@@ -36,6 +37,7 @@ pub mod model;
 pub mod params;
 pub mod paths;
 mod radii;
+pub mod stage;
 mod vector;
 
 pub use error::Error;
@@ -69,6 +71,7 @@ pub fn skeleton(
     let cloud = Cloud::new(points, wood)?;
     let base = base_m.map(|base| cloud.from_given(base));
     Ok(match params.method {
-        Method::Levels | Method::Adtree => levels::skeleton(&cloud, base, params, points.len()),
+        Method::Levels => levels::skeleton(&cloud, base, params, points.len()),
+        Method::Adtree => adtree::skeleton(&cloud, params, points.len()),
     })
 }

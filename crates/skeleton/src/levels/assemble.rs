@@ -72,7 +72,7 @@ fn fork_of(branches: &[Branch], branch: &Branch) -> u32 {
 
 /// The first radius as AdTree takes it, where no circle was seen.
 fn fallback_radius(cloud: &Cloud) -> f64 {
-    base::first_radius_m(cloud, &base::lowest(cloud)).max(1e-3)
+    base::first_radius_m(&cloud.points, &base::lowest(&cloud.points)).max(1e-3)
 }
 
 fn line(

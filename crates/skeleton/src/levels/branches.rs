@@ -7,10 +7,10 @@ use crate::vector::{Vector, distance, dot, to_segment};
 
 /// What a branch must explain at `detail` 1: the distances of its points from the surface of the
 /// branch it leaves, in spacings, added up. Measured: see `tests/real.rs`.
-const EXPLAINED_SPACINGS: f64 = 24.0;
+const EXPLAINED_SPACINGS: f64 = 5.0;
 
 /// Fewest points of a branch at `detail` 1.
-const FEWEST_POINTS: f64 = 4.0;
+const FEWEST_POINTS: f64 = 3.0;
 
 /// Sections before and after the fork that a point may be nearest to instead.
 const AROUND_FORK: usize = 6;

@@ -11,16 +11,19 @@ pub(crate) struct Circle {
     pub(crate) spread: f64,
 }
 
-/// What is known before the points are looked at: the radius of the section below.
+/// What is known before the points are looked at: a radius and its standard deviation, m. An arc
+/// long enough for its noise overrules it.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Prior {
     pub(crate) radius: f64,
-    /// Its weight, in points.
-    pub(crate) weight: f64,
+    pub(crate) deviation: f64,
 }
 
 /// Rounds of reweighting: changes are far below the noise after that many.
 const ROUNDS: usize = 8;
+
+/// Points beyond this many median distances are left out of the start.
+const TRIM: f64 = 2.5;
 
 /// Tukey's constant, in robust standard deviations (Beaton and Tukey 1974).
 const TUKEY: f64 = 4.685;
@@ -28,20 +31,62 @@ const TUKEY: f64 = 4.685;
 /// Standard deviations in a median absolute deviation.
 const MAD: f64 = 1.4826;
 
-/// Fits a circle: algebraically (Kåsa 1976) first, then by geometric distance in Gauss-Newton steps
-/// under Tukey's loss. `None` when the points lie on a line or the steps lead nowhere.
+/// Rounds in which the algebraic start leaves out what lies far off.
+const TRIMS: usize = 3;
+
+/// A circle this many times wider than its points are apart is a line.
+const FLATTEST: f64 = 20.0;
+
+/// Fits a circle: algebraically (Kåsa 1976) to what lies near, then by geometric distance in
+/// Gauss-Newton steps under Tukey's loss. `None` when the points lie on a line or the steps lead
+/// nowhere.
 pub(crate) fn fit(points: &[[f64; 2]], prior: Option<Prior>) -> Option<Circle> {
-    let mut circle = algebraic(points, prior)?;
+    let mut circle = start(points, prior)?;
     for _ in 0..ROUNDS {
-        circle.spread = spread(points, &circle);
+        let before = circle;
         circle = step(points, &circle, prior)?;
+        circle.spread = spread(points, &circle);
+        if moved(&before, &circle) < 1e-5 {
+            break;
+        }
     }
-    circle.spread = spread(points, &circle);
-    let numbers = circle.centre.iter().chain([&circle.radius]).all(|value| value.is_finite());
-    (numbers && circle.radius > 0.0).then_some(circle)
+    let away = points.iter().map(|p| apart(*p, points[0])).fold(0.0, f64::max);
+    let sound = circle.radius > 0.0 && circle.radius <= FLATTEST * away;
+    (sound && circle.centre.iter().all(|value| value.is_finite())).then_some(circle)
 }
 
-fn algebraic(points: &[[f64; 2]], prior: Option<Prior>) -> Option<Circle> {
+fn moved(a: &Circle, b: &Circle) -> f64 {
+    apart(a.centre, b.centre).max((a.radius - b.radius).abs())
+}
+
+fn apart(a: [f64; 2], b: [f64; 2]) -> f64 {
+    let d = [a[0] - b[0], a[1] - b[1]];
+    (d[0] * d[0] + d[1] * d[1]).sqrt()
+}
+
+fn start(points: &[[f64; 2]], prior: Option<Prior>) -> Option<Circle> {
+    let mut circle = algebraic(points)?;
+    circle.spread = spread(points, &circle);
+    for _ in 0..TRIMS {
+        let near = |p: &&[f64; 2]| from_circle(p, &circle).abs() <= TRIM * circle.spread;
+        let kept: Vec<[f64; 2]> = points.iter().filter(near).copied().collect();
+        if kept.len() == points.len() {
+            break;
+        }
+        let Some(trimmed) = algebraic(&kept) else {
+            break;
+        };
+        circle = Circle { spread: spread(points, &trimmed), ..trimmed };
+    }
+    // On a short noisy arc this circle is far too small: begin with the known radius instead.
+    if let Some(prior) = prior.filter(|prior| circle.radius < 0.5 * prior.radius) {
+        circle = pushed_in(points, &circle, prior);
+        circle.spread = spread(points, &circle);
+    }
+    Some(circle)
+}
+
+fn algebraic(points: &[[f64; 2]]) -> Option<Circle> {
     let (mut matrix, mut right) = (Matrix3::zeros(), Vector3::zeros());
     for p in points {
         let row = Vector3::new(p[0], p[1], 1.0);
@@ -51,16 +96,11 @@ fn algebraic(points: &[[f64; 2]], prior: Option<Prior>) -> Option<Circle> {
     let [a, b, c]: [f64; 3] = matrix.cholesky()?.solve(&right).into();
     let centre = [a / 2.0, b / 2.0];
     let squared = c + centre[0] * centre[0] + centre[1] * centre[1];
-    let circle = Circle { centre, radius: squared.max(0.0).sqrt(), spread: 0.0 };
-    // On a short noisy arc this circle is far too small: begin with the known radius instead.
-    match prior {
-        Some(prior) if circle.radius < 0.5 * prior.radius => pushed_in(points, &circle, prior),
-        _ => Some(circle),
-    }
+    Some(Circle { centre, radius: squared.max(0.0).sqrt(), spread: 0.0 })
 }
 
 /// The circle of the known radius on the same side of the points as one through them.
-fn pushed_in(points: &[[f64; 2]], circle: &Circle, prior: Prior) -> Option<Circle> {
+fn pushed_in(points: &[[f64; 2]], circle: &Circle, prior: Prior) -> Circle {
     let n = points.len() as f64;
     let sum = points.iter().fold([0.0; 2], |sum, p| [sum[0] + p[0], sum[1] + p[1]]);
     let mean = [sum[0] / n, sum[1] / n];
@@ -68,7 +108,7 @@ fn pushed_in(points: &[[f64; 2]], circle: &Circle, prior: Prior) -> Option<Circl
     let length = (to[0] * to[0] + to[1] * to[1]).sqrt();
     let by = if length > 1e-9 { (prior.radius - circle.radius) / length } else { 0.0 };
     let centre = [circle.centre[0] + by * to[0], circle.centre[1] + by * to[1]];
-    Some(Circle { centre, radius: prior.radius, spread: 0.0 })
+    Circle { centre, radius: prior.radius, spread: 0.0 }
 }
 
 /// One Gauss-Newton step on weighted distances.
@@ -89,8 +129,9 @@ fn step(points: &[[f64; 2]], at: &Circle, prior: Option<Prior>) -> Option<Circle
         right += row * (residual * weight);
     }
     if let Some(prior) = prior {
-        matrix[(2, 2)] += prior.weight;
-        right[2] += prior.weight * (prior.radius - at.radius);
+        let ratio = (MAD * at.spread / prior.deviation).max(1e-6);
+        matrix[(2, 2)] += ratio * ratio;
+        right[2] += ratio * ratio * (prior.radius - at.radius);
     }
     let by: [f64; 3] = matrix.cholesky()?.solve(&right).into();
     let centre = [at.centre[0] + by[0], at.centre[1] + by[1]];
@@ -128,7 +169,7 @@ mod tests {
         assert!((whole.radius - 0.15).abs() < 0.001 && whole.spread < 0.003, "{whole:?}");
         let mut third = arc(0.3, 2.4, 0.003);
         third.extend([[3.4, -2.3], [2.6, -1.5], [3.1, -1.4]]);
-        let prior = Prior { radius: 0.16, weight: 3.0 };
+        let prior = Prior { radius: 0.16, deviation: 0.04 };
         let part = fit(&third, Some(prior)).unwrap();
         assert!((part.radius - 0.15).abs() < 0.01, "{part:?}");
         assert!((part.centre[0] - 3.0).abs() < 0.01 && (part.centre[1] + 2.0).abs() < 0.01);

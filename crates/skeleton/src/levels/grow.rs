@@ -1,17 +1,17 @@
 //! Sections grown from the base upwards, each as long as its branch is thick.
 
 use super::cluster::clusters;
-use super::section::{Members, Section, Shape, shape};
+use super::section::{Known, Members, Section, Shape, shape};
 use crate::cloud::Cloud;
 use crate::paths::{NONE, Paths};
 use crate::vector::{Vector, distance};
 
 /// Length of a section in spacings, and in radii of the section below: the longer of the two.
-const LENGTH_SPACINGS: f64 = 1.5;
+const LENGTH_SPACINGS: f64 = 0.75;
 const LENGTH_RADII: f64 = 1.0;
 
 /// Points of a section are parted where a gap is wider than this many spacings and radii.
-const GAP_SPACINGS: f64 = 1.2;
+const GAP_SPACINGS: f64 = 0.6;
 const GAP_RADII: f64 = 0.9;
 
 /// The tree of sections over the points.
@@ -42,7 +42,7 @@ pub(crate) struct Ground<'a> {
     pub(crate) first_radius_m: f64,
     /// Length of the first section, m.
     pub(crate) first_length_m: f64,
-    /// Factor on lengths and gaps in spacings: below 1 for more detail.
+    /// Factor on lengths and gaps that are told in spacings: below 1 for more detail.
     pub(crate) fineness: f64,
 }
 
@@ -51,6 +51,8 @@ pub(crate) struct Ground<'a> {
 pub(crate) struct Upwards {
     start: Vec<u32>,
     to: Vec<u32>,
+    /// Points whose paths lead over each, itself among them.
+    beyond: Vec<u32>,
 }
 
 impl Upwards {
@@ -70,7 +72,11 @@ impl Upwards {
             to[*place as usize] = v;
             *place += 1;
         }
-        Self { start, to }
+        let mut beyond = vec![1; paths.parent.len()];
+        for &v in paths.order.iter().rev().filter(has_parent) {
+            beyond[paths.parent[v as usize] as usize] += beyond[v as usize];
+        }
+        Self { start, to, beyond }
     }
 
     pub(crate) fn of(&self, point: u32) -> &[u32] {
@@ -130,7 +136,9 @@ fn advance(ground: &Ground<'_>, grown: &mut Grown, front: &Front, fronts: &mut V
         let above = group.iter().flat_map(|&point| ground.upwards.of(point));
         let seeds: Vec<u32> = above.filter(|point| length(point) >= upto).copied().collect();
         let parent = grown.sections.len() as u32;
-        add_section(ground, grown, front.parent, below.as_ref(), &group);
+        let beyond = |&point: &u32| f64::from(ground.upwards.beyond[point as usize]);
+        let carried = group.len() as f64 + seeds.iter().map(beyond).sum::<f64>();
+        add_section(ground, grown, front.parent, &group, carried);
         if !seeds.is_empty() {
             fronts.push(Front { parent, seeds, from_m: upto });
         }
@@ -141,14 +149,16 @@ fn add_section(
     ground: &Ground<'_>,
     grown: &mut Grown,
     parent: u32,
-    below: Option<&Shape>,
     group: &[u32],
+    carried: f64,
 ) {
+    let below: Option<Shape> = grown.sections.get(parent as usize).map(|section| section.shape);
     let points: Vec<Vector> = group.iter().map(|&p| ground.cloud.points[p as usize]).collect();
     let wood: Vec<f32> = group.iter().map(|&p| ground.cloud.wood[p as usize]).collect();
     let spacing = mean_spacing(ground, group);
-    let members = Members { points: &points, wood: &wood, spacing };
-    let shape = shape(&members, below, ground.first_radius_m);
+    let members = Members { points: &points, wood: &wood, spacing, carried };
+    let first = Known { centre: None, radius: ground.first_radius_m, carried };
+    let shape = shape(&members, below.as_ref(), first);
     let start = grown.points.len() as u32;
     grown.points.extend_from_slice(group);
     let end = grown.points.len() as u32;

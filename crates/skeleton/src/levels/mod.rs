@@ -29,8 +29,8 @@ const SPACING_RANK: usize = 4;
 /// The first section is this share of the tree's height.
 const FIRST_SHARE: f64 = 0.02;
 
-/// Sections are made shorter by at most this factor for more detail.
-const FINEST: f64 = 0.4;
+/// Factors by which sections are at most longer and shorter for less and more detail.
+const FINENESS: (f64, f64) = (0.7, 2.0);
 
 /// How much costlier an edge to leaves is.
 const LEAF_COST: f64 = 3.0;
@@ -48,7 +48,7 @@ pub(crate) fn skeleton(
     let graph = near.graph();
     let pieces = Pieces::new(&tree, &cloud.points, &graph);
     drop(tree);
-    let root = base::root(cloud, base_m, |point| pieces.may_hold_base(point));
+    let root = base::root(&cloud.points, base_m, |point| pieces.may_hold_base(point));
     let joined = pieces.join(root, spacing_m, params.gap_m);
     let graph = graph.with(&joined.bridges);
     let sources = sources(cloud, &graph, root, spacing_m);
@@ -91,8 +91,8 @@ fn build(
         spacing_m,
         length_m: &length_m,
         upwards: &upwards,
-        first_radius_m: base::first_radius_m(cloud, &sources),
-        fineness: (1.0 / params.detail.max(1.0).sqrt()).max(FINEST),
+        first_radius_m: base::first_radius_m(&cloud.points, &sources),
+        fineness: (1.0 / params.detail.sqrt()).clamp(FINENESS.0, FINENESS.1),
         first_length_m: (FIRST_SHARE * (high - low)).max(2.0 * median(spacing_m)),
     };
     let grown = grow::grow(&ground, sources);
