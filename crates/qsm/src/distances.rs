@@ -13,7 +13,7 @@ use timberline_solids::{Cylinder, CylinderIndex, DistanceSummary, free_ends};
 const SPACING_M: f64 = 0.02;
 const MOST_SAMPLES: f64 = 60_000.0;
 /// Sectors of a cylinder that are seen or not.
-const SECTORS: usize = 12;
+const SECTORS: usize = 24;
 /// Samples deeper than this inside another cylinder are no surface, as a share of their own radius:
 /// cylinders one after the other overlap where a branch bends.
 const INSIDE_RADII: f64 = 0.05;
@@ -32,7 +32,7 @@ pub fn cloud_to_model(points_m: &[[f64; 3]], model: &Model) -> DistanceSummary {
 /// From samples of the model's surface that could be seen to the nearest point.
 ///
 /// Samples lie on a lattice on every cylinder. One could be seen when it lies inside no other
-/// cylinder and the scan has points on its side of the branch: in its sector of 30 degrees or the
+/// cylinder and the scan has points on its side of the branch: in its sector of 15 degrees or the
 /// next, on its cylinder or the neighbours along the branch. What is on a side that no point was
 /// ever recorded on was not seen, and a distance there would measure the scan. Cylinders without any
 /// point are left out with it; [`unseen_cylinders`] counts them.

@@ -2,9 +2,7 @@
 
 use crate::dbh::{Dbh, TaperStep};
 use crate::metrics::{Metrics, order_table};
-use crate::{
-    Choice, Model, ModelledTree, Params, RadiusSource, SkeletonNode, TreePoints, choose,
-};
+use crate::{Choice, Model, ModelledTree, Params, RadiusSource, SkeletonNode, TreePoints, choose};
 use timberline_artefact::kinds;
 use timberline_artefact::kinds::{Consolidated, Qsm, Skeletons, TreeCloud};
 use timberline_artefact::stage::{Context, InputSpec, Inputs, Stage, StageError, StageInfo};
@@ -97,7 +95,8 @@ fn warn(context: &Context<'_>, tree_id: u64, tree: &ModelledTree) {
             "nothing of the stem could be measured: no diameter at breast height".to_owned(),
         ),
         None => {
-            context.warn(subject(), "the stem does not reach breast height: no diameter".to_owned());
+            context
+                .warn(subject(), "the stem does not reach breast height: no diameter".to_owned());
         }
         Some(Dbh { source: RadiusSource::Interpolated, diameter_m, sd_m, .. }) => {
             let (diameter, sd) = (diameter_m * 100.0, sd_m * 100.0);
