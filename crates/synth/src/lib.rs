@@ -36,6 +36,7 @@ pub mod species;
 pub mod stand;
 pub mod tables;
 pub mod terrain;
+pub mod terrestrial;
 pub mod tree;
 
 mod canopy;

@@ -17,7 +17,7 @@ use timberline_pointcloud::Rect;
 pub(crate) const RAYS: usize = 5;
 /// Distance of the outer rays from the axis, in radii at 1/e² of the intensity: the median radius of
 /// the energy outside the innermost fifth, from 1 - exp(-2 (r/w)^2) = 0.6.
-const OUTER: f64 = 0.676_87;
+pub(crate) const OUTER: f64 = 0.676_87;
 /// Share of light thrown back by bare ground and by wood.
 const GROUND_REFLECTANCE: f64 = 0.27;
 const WOOD_REFLECTANCE: f64 = 0.22;

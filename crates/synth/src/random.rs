@@ -23,6 +23,12 @@ pub enum Domain {
     Noise = 6,
     /// What experiments do to trees and points of a scene.
     Experiment = 7,
+    /// The axes and leaves of a tree that is grown piece by piece.
+    Growth = 8,
+    /// A column of pulses of a terrestrial scanner.
+    Beam = 9,
+    /// Places and sizes of what grows on a terrestrial plot.
+    TerrestrialPlot = 10,
 }
 
 /// One stream of numbers.

@@ -1,26 +1,26 @@
 //! Truth and field data as text: CSV tables with units in their headers, and an ASCII raster.
 
-use crate::{FieldPlot, PlotKind, Scene, Tree};
+use crate::{FieldPlot, PlotKind, Scene, Terrain, Tree};
 use std::fmt::Write as _;
 use timberline_pointcloud::Rect;
 
 /// A table under construction.
-struct Table {
-    text: String,
+pub(crate) struct Table {
+    pub(crate) text: String,
 }
 
 impl Table {
-    fn new(header: &str) -> Self {
+    pub(crate) fn new(header: &str) -> Self {
         Self { text: format!("{header}\n") }
     }
 
-    fn row(&mut self, cells: &[String]) {
+    pub(crate) fn row(&mut self, cells: &[String]) {
         self.text.push_str(&cells.join(","));
         self.text.push('\n');
     }
 }
 
-fn number(value: f64, decimals: usize) -> String {
+pub(crate) fn number(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     // A rounded -0.00 would differ from 0.00 for no reason.
     if text.bytes().all(|b| matches!(b, b'-' | b'0' | b'.')) { text.replace('-', "") } else { text }
@@ -173,6 +173,11 @@ pub fn stands(scene: &Scene) -> String {
 /// edges are left out.
 #[must_use]
 pub fn truth_dtm(scene: &Scene, rect: &Rect, cell_m: f64) -> String {
+    dtm(scene.terrain(), rect, cell_m)
+}
+
+/// See [`truth_dtm`].
+pub(crate) fn dtm(terrain: &Terrain, rect: &Rect, cell_m: f64) -> String {
     let [columns, rows] = rect.size().map(|edge| (edge / cell_m + 1e-9).floor() as usize);
     let mut text = format!(
         "ncols {columns}\nnrows {rows}\nxllcorner {}\nyllcorner {}\ncellsize {cell_m}\nNODATA_value -9999\n",
@@ -182,7 +187,7 @@ pub fn truth_dtm(scene: &Scene, rect: &Rect, cell_m: f64) -> String {
         let y = rect.min[1] + (row as f64 + 0.5) * cell_m;
         let cells: Vec<String> = (0..columns)
             .map(|column| rect.min[0] + (column as f64 + 0.5) * cell_m)
-            .map(|x| number(scene.terrain().elevation_m(x, y), 3))
+            .map(|x| number(terrain.elevation_m(x, y), 3))
             .collect();
         text.push_str(&cells.join(" "));
         text.push('\n');

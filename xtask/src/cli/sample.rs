@@ -9,7 +9,7 @@ use timberline_artefact::Crs;
 use timberline_artefact::publish::write_atomic;
 use timberline_export::las::{LasOptions, write_las};
 use timberline_pointcloud::PointCloud;
-use timberline_synth::sample;
+use timberline_synth::sample::{self, SampleStand};
 
 /// Arguments of `sample`.
 #[derive(Debug, clap::Args)]
@@ -24,8 +24,13 @@ pub struct Args {
 /// # Errors
 /// When a file cannot be written.
 pub fn run(args: &Args) -> Result<u8> {
-    let stand = sample::als_stand()?;
-    let folder = args.out.join("als-stand");
+    write(&args.out.join("als-stand"), sample::als_stand()?)?;
+    write(&args.out.join("tls-plot"), sample::tls_plot()?)?;
+    Ok(DONE)
+}
+
+/// Writes the files of a sample.
+fn write(folder: &Path, stand: SampleStand) -> Result<()> {
     let crs = utm_crs(u32::from(stand.epsg));
     for tile in &stand.tiles {
         write_scan(&folder.join(&tile.name), &tile.cloud, &crs)?;
@@ -36,7 +41,7 @@ pub fn run(args: &Args) -> Result<u8> {
         write_atomic(&path, text.as_bytes())?;
         out::line(&format!("{} ({})", path.display(), bytes(text.len() as u64)));
     }
-    Ok(DONE)
+    Ok(())
 }
 
 /// Writes points as LAZ (by the path's ending).

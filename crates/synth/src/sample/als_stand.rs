@@ -1,5 +1,6 @@
-//! The sample that is kept with the program: a virtual survey of one stand, in four files.
+//! A virtual airborne survey of one stand, in four files.
 
+use super::{SampleStand, SampleTile};
 use crate::plots::{self, PlotKind, PlotSite, Protocol};
 use crate::pulse::Undergrowth;
 use crate::scanner::ScannerParams;
@@ -7,7 +8,7 @@ use crate::scene::{Scene, SceneParams};
 use crate::stand::{Stand, StandParams};
 use crate::terrain::{Gully, TerrainParams};
 use crate::{Error, FieldPlot, tables};
-use timberline_pointcloud::{PointCloud, Rect};
+use timberline_pointcloud::Rect;
 
 /// CRS of the sample: NAD83 / UTM zone 10N, whose elevations are taken as metres.
 pub const EPSG: u16 = 26910;
@@ -22,30 +23,6 @@ const MARGIN_M: f64 = 25.0;
 const SEED: u64 = 20_260_117;
 /// Cells of the true ground that is kept with the sample, m.
 const DTM_CELL_M: f64 = 2.0;
-
-/// One file of points.
-#[derive(Debug, Clone)]
-pub struct SampleTile {
-    /// Path of the file within the sample's folder.
-    pub name: String,
-    /// What the file covers.
-    pub rect: Rect,
-    /// Its points.
-    pub cloud: PointCloud,
-}
-
-/// All that the sample's folder holds.
-#[derive(Debug, Clone)]
-pub struct SampleStand {
-    /// Point files.
-    pub tiles: Vec<SampleTile>,
-    /// Text files: path within the folder, contents.
-    pub tables: Vec<(String, String)>,
-    /// Contents of `campaign.toml`.
-    pub campaign_toml: String,
-    /// CRS of all positions.
-    pub epsg: u16,
-}
 
 /// The sample's scene.
 #[must_use]
