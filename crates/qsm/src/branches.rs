@@ -1,5 +1,6 @@
 //! A skeleton taken apart into branches.
 
+use crate::points::rounded;
 use crate::{Error, SkeletonNode};
 use std::collections::VecDeque;
 use timberline_solids::vector::{along, distance, dot, sub, unit};
@@ -133,6 +134,7 @@ pub fn split(nodes: &[SkeletonNode]) -> Result<Vec<Branch>, Error> {
 fn fill(branch: &mut Branch, nodes: &[SkeletonNode], path: &[usize]) {
     for &node in path {
         let SkeletonNode { position_m, radius_m, .. } = nodes[node];
+        let position_m = rounded(position_m);
         match branch.path_m.last() {
             Some(last) if distance(*last, position_m) <= 0.0 => {}
             Some(_) => {
@@ -236,6 +238,15 @@ mod tests {
         assert!(split(&ahead).unwrap_err().to_string().contains("parent Some(2)"));
         let second = [node([0.0; 3], None), node([0.0, 0.0, 1.0], None)];
         assert!(matches!(split(&second), Err(Error::Parent { node: 1, parent: None })));
+    }
+
+    #[test]
+    fn the_last_bits_do_not_matter() {
+        let path = |x: f64| {
+            let nodes = [node([x, 0.0, 0.0], None), node([x, 0.0, 1.0], Some(0))];
+            split(&nodes).unwrap()[0].path_m.clone()
+        };
+        assert_eq!(path(0.1), path(0.1 + 1e-9));
     }
 
     #[test]

@@ -4,7 +4,7 @@ use crate::fit::{Expected, Fit, Sample, fit};
 use crate::measure::{Owned, View, accepted, within};
 use crate::monotone::weighted_median;
 use crate::{Model, ModelCylinder, Params, RadiusSource};
-use timberline_solids::vector::{along, dot, scale, sub, unit};
+use timberline_solids::vector::{along, dot, sub, unit};
 
 /// A diameter at breast height.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -55,7 +55,7 @@ pub fn dbh(
     noise_m: Option<f64>,
     params: &Params,
 ) -> Option<Dbh> {
-    let place = at_height(model, base_z_m + params.breast_height_m)?;
+    let (_, place) = at_height(model, base_z_m + params.breast_height_m)?;
     let noise_m = noise_m.unwrap_or(params.noise_m);
     if params.method == crate::Method::Fitted
         && let Some(found) = of_slices(model, &place, owned, noise_m, params)
@@ -64,7 +64,10 @@ pub fn dbh(
     }
     let cylinder = place.cylinder;
     let adtree = params.method == crate::Method::Adtree;
-    (adtree || cylinder.source != RadiusSource::Inferred).then(|| Dbh {
+    if !adtree && cylinder.source == RadiusSource::Inferred {
+        return None;
+    }
+    Some(Dbh {
         diameter_m: 2.0 * cylinder.solid.radius_m,
         sd_m: 2.0 * cylinder.radius_sd_m,
         arc_coverage: cylinder.arc_coverage,
@@ -73,16 +76,16 @@ pub fn dbh(
     })
 }
 
-/// The lowest cylinder of the stem that passes an elevation.
-fn at_height(model: &Model, z_m: f64) -> Option<Place<'_>> {
-    model.stem().iter().find_map(|cylinder| {
+/// The lowest cylinder of the stem that passes an elevation, and its place on the stem.
+fn at_height(model: &Model, z_m: f64) -> Option<(usize, Place<'_>)> {
+    model.stem().iter().enumerate().find_map(|(number, cylinder)| {
         let (low, high) = (cylinder.solid.start_m, cylinder.solid.end_m);
         if !(low[2] <= z_m && high[2] > z_m) {
             return None;
         }
         let share = (z_m - low[2]) / (high[2] - low[2]);
         let at_m = along(low, sub(high, low), share);
-        Some(Place { at_m, along: unit(sub(high, low))?, cylinder })
+        Some((number, Place { at_m, along: unit(sub(high, low))?, cylinder }))
     })
 }
 
@@ -185,31 +188,31 @@ pub struct TaperStep {
 #[must_use]
 pub fn taper(model: &Model, base_z_m: f64, params: &Params) -> Vec<TaperStep> {
     let stem = model.stem();
-    let middle = |c: &ModelCylinder| {
-        scale(timberline_solids::vector::add(c.solid.start_m, c.solid.end_m), 0.5)
+    let ends = stem.iter().map(|cylinder| cylinder.solid.end_m[2]);
+    let top = ends.fold(f64::NEG_INFINITY, f64::max) - base_z_m;
+    if !top.is_finite() || top < 0.0 {
+        return Vec::new();
+    }
+    let steps = (top / params.taper_step_m).floor() as usize;
+    let one = |step: usize| {
+        let height_m = step as f64 * params.taper_step_m;
+        let z_m = base_z_m + height_m;
+        let (at, place) = at_height(model, z_m)?;
+        let diameter_m = 2.0 * radius_between(stem, at, z_m);
+        Some(TaperStep { height_m, diameter_m, source: place.cylinder.source })
     };
-    let top = stem.iter().map(|c| c.solid.end_m[2]).fold(f64::NEG_INFINITY, f64::max) - base_z_m;
-    let steps =
-        if top.is_finite() { (top / params.taper_step_m).floor().max(0.0) as usize } else { 0 };
-    (0..=steps)
-        .filter_map(|step| {
-            let height_m = step as f64 * params.taper_step_m;
-            let z = base_z_m + height_m;
-            let place = at_height(model, z)?;
-            let here = stem.iter().position(|c| std::ptr::eq(c, place.cylinder))?;
-            let below = middle(place.cylinder)[2] > z;
-            let other = if below { here.checked_sub(1) } else { Some(here + 1) };
-            let radius_m = other.and_then(|other| stem.get(other)).map_or(
-                place.cylinder.solid.radius_m,
-                |other| {
-                    let (a, b) = (middle(place.cylinder)[2], middle(other)[2]);
-                    let share =
-                        if (b - a).abs() > 0.0 { ((z - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 };
-                    let (ra, rb) = (place.cylinder.solid.radius_m, other.solid.radius_m);
-                    ra + (rb - ra) * share
-                },
-            );
-            Some(TaperStep { height_m, diameter_m: 2.0 * radius_m, source: place.cylinder.source })
-        })
-        .collect()
+    (0..=steps).filter_map(one).collect()
+}
+
+/// Radius at an elevation within a cylinder, by those of the nearest middles of cylinders.
+fn radius_between(stem: &[ModelCylinder], at: usize, z_m: f64) -> f64 {
+    let middle = |c: &ModelCylinder| 0.5 * (c.solid.start_m[2] + c.solid.end_m[2]);
+    let here = &stem[at];
+    let other = if middle(here) > z_m { at.checked_sub(1) } else { Some(at + 1) };
+    let Some(other) = other.and_then(|other| stem.get(other)) else {
+        return here.solid.radius_m;
+    };
+    let apart = middle(other) - middle(here);
+    let share = if apart == 0.0 { 0.0 } else { ((z_m - middle(here)) / apart).clamp(0.0, 1.0) };
+    here.solid.radius_m + (other.solid.radius_m - here.solid.radius_m) * share
 }

@@ -14,6 +14,17 @@ pub struct Points {
     pub not_finite: usize,
 }
 
+/// Grains in a metre. Positions are rounded to them, a micrometre, so that the last bits, which change
+/// when the world is shifted by whole metres, change nothing. Every tick of the world's lattice of
+/// 0.1 mm is a grain, so that none of its points is near the edge between two.
+const GRAINS_PER_M: f64 = 1e6;
+
+/// A position rounded to a micrometre.
+#[must_use]
+pub fn rounded(position_m: [f64; 3]) -> [f64; 3] {
+    position_m.map(|value| (value * GRAINS_PER_M + 0.5).floor() / GRAINS_PER_M)
+}
+
 /// Edge of the cells that are visited one after the other, m.
 const CELL_M: f64 = 0.125;
 
@@ -31,21 +42,20 @@ impl Points {
             return Err(Error::TooManyPoints(points));
         }
         let wood_of = |index: u32| tree.wood.map_or(0.0, |wood| wood[index as usize]);
+        let position = |index: u32| rounded(tree.points_m[index as usize]);
         let finite = |index: &u32| tree.points_m[*index as usize].iter().all(|v| v.is_finite());
-        let mut keyed: Vec<([i64; 3], u32)> = (0..points as u32)
-            .filter(finite)
-            .map(|index| (cell(tree.points_m[index as usize]), index))
-            .collect();
+        let mut keyed: Vec<([i64; 3], u32)> =
+            (0..points as u32).filter(finite).map(|index| (cell(position(index)), index)).collect();
         keyed.sort_unstable_by(|a, b| {
-            let (p, q) = (tree.points_m[a.1 as usize], tree.points_m[b.1 as usize]);
+            let (p, q) = (position(a.1), position(b.1));
             let by_axis = |k: usize| p[k].total_cmp(&q[k]);
-            let position = || by_axis(2).then_with(|| by_axis(0)).then_with(|| by_axis(1));
+            let by_position = || by_axis(2).then_with(|| by_axis(0)).then_with(|| by_axis(1));
             let wood = || wood_of(a.1).total_cmp(&wood_of(b.1));
-            a.0.cmp(&b.0).then_with(position).then_with(wood)
+            a.0.cmp(&b.0).then_with(by_position).then_with(wood)
         });
         let pick = |wood: &[f32]| keyed.iter().map(|(_, index)| wood[*index as usize]).collect();
         Ok(Self {
-            points_m: keyed.iter().map(|(_, index)| tree.points_m[*index as usize]).collect(),
+            points_m: keyed.iter().map(|(_, index)| position(*index)).collect(),
             wood: tree.wood.map(pick),
             not_finite: points - keyed.len(),
         })
@@ -79,7 +89,7 @@ mod tests {
     #[test]
     fn order_does_not_matter_and_what_is_not_finite_is_counted() {
         let mut points =
-            vec![[0.3, 0.1, 1.0], [f64::NAN, 0.0, 0.0], [0.2, 0.1, 1.0], [0.2, 0.1, 1.0]];
+            vec![[0.3, 0.125, 1.0], [f64::NAN, 0.0, 0.0], [0.2, 0.1, 1.0], [0.2, 0.1, 1.0]];
         let mut wood = vec![0.1, 0.2, 0.9, 0.4];
         let sorted = |points: &[[f64; 3]], wood: &[f32]| {
             let tree = TreePoints { points_m: points, wood: Some(wood), base_m: [0.0; 3] };

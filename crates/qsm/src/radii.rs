@@ -16,7 +16,7 @@ use crate::{Params, RadiusSource};
 /// per cent (Pulkkinen 2012 has 4 to 6 % between the largest and the smallest diameter of pines).
 const ROUNDNESS: f64 = 0.02;
 /// Part of the noise that all points of a section have in common: footprint and mixed pixels.
-const COMMON_NOISE: f64 = 0.3;
+const COMMON_NOISE: f64 = 0.4;
 /// A measured radius this many standard deviations from what the pipe model or the branch below say
 /// is something else: leaves, a neighbour, a branch at its fork.
 const TOO_FAR: f64 = 3.0;
