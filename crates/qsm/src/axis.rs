@@ -1,11 +1,11 @@
 //! Axes moved to where the fits say they are, joined along branches.
 
+use crate::RadiusSource;
 use crate::branches::{Branch, Fork, position_at};
 use crate::fit::Sample;
 use crate::measure::{Measured, Owned, view};
 use crate::radii::Radius;
 use crate::sections::{Section, Sections};
-use crate::{RadiusSource, assign};
 use rayon::prelude::*;
 use timberline_solids::vector::{add, distance, scale, sub};
 
@@ -260,22 +260,4 @@ pub fn rebuilt(
         Branch { path_m, radius_m, fork: joints.fork, order: branch.order, begin_m: 0.0 }
     };
     branches.iter().zip(joints).enumerate().map(one).collect()
-}
-
-/// How far a branch runs inside the one it grows on: until it is as deep below that one's surface as
-/// it is thick, so that no wood counts twice and the two still overlap. At most four fifths of it.
-#[must_use]
-pub fn buried_m(branch: &Branch, parent: &[Section]) -> f64 {
-    const STEPS: usize = 24;
-    let stations = branch.stations_m();
-    let most = 0.8 * stations[stations.len() - 1];
-    let radius_m = branch.radius_m[0];
-    let thickest = parent.iter().fold(0.0f64, |most, section| most.max(section.radius_m));
-    let step = most.min(3.0 * thickest) / STEPS as f64;
-    let outside = |place: &usize| {
-        let at = position_at(&branch.path_m, &stations, *place as f64 * step);
-        let outwards = parent.iter().map(|section| assign::outwards_m(section, at));
-        outwards.fold(f64::INFINITY, f64::min) > -radius_m
-    };
-    (0..=STEPS).find(outside).unwrap_or(STEPS) as f64 * step
 }

@@ -1,12 +1,12 @@
 //! From a skeleton and points to a model.
 
 use crate::assign::assign;
-use crate::axis::{Joints, buried_m, moved, rebuilt};
+use crate::axis::{Joints, moved, rebuilt};
 use crate::branches::{Branch, split};
 use crate::measure::{Measured, Owned, measure, noise_of, noise_of_stem};
 use crate::pipe::PipeModel;
 use crate::points::Points;
-use crate::prune::{around, pruned};
+use crate::prune::{begin, pruned};
 use crate::radii::{Given, Radius, radii};
 use crate::sections::{Sections, as_they_are, cut};
 use crate::{Error, Method, Model, ModelBranch, ModelCylinder, Params, RadiusSource, SkeletonNode};
@@ -98,10 +98,7 @@ fn fitted(points: &Points, branches: Vec<Branch>, params: &Params) -> Built {
     let branches = rebuilt(&branches, &first.joints, &first.sections, &first.radii);
     let mut branches = pruned(branches.clone(), &cut(&branches, params), noise);
     let sections = cut(&branches, params);
-    for branch in &mut branches {
-        let Some(fork) = branch.fork else { continue };
-        branch.begin_m = buried_m(branch, around(&sections, fork.branch as usize, fork.at_m));
-    }
+    begin(&mut branches, &sections, noise);
     let second = pass(points, &branches, first.noise_m, params);
     let Pass { sections, owner, measured, radii, joints, noise_m, pipe } = second;
     let model = model(&branches, &sections, &joints, &radii, &measured);

@@ -34,6 +34,8 @@ const NOISE_WEIGHT: f64 = 8.0;
 const ROUNDNESS: f64 = 0.01;
 /// Slices and the stem's own radius may differ by this share of it, besides their errors.
 const AGREEMENT: f64 = 0.1;
+/// Standard error over the diameter from which the rest of the stem may know better.
+const POOR: f64 = 0.1;
 /// Window of points around the expected axis, in expected radii, and in noises.
 const WINDOW: (f64, f64) = (2.0, 5.0);
 
@@ -113,9 +115,12 @@ fn of_slices(
         })
         .collect();
     let found = combined(&fits)?;
-    let error = 3.0 * libm::hypot(found.sd_m, 2.0 * place.cylinder.radius_sd_m);
+    let stem_sd_m = 2.0 * place.cylinder.radius_sd_m;
     let off = (found.diameter_m - 2.0 * radius_m).abs();
-    (off <= 2.0 * AGREEMENT * radius_m + error).then_some(found)
+    let agrees = off <= 2.0 * AGREEMENT * radius_m + 3.0 * libm::hypot(found.sd_m, stem_sd_m);
+    // Slices that tell less than the stem around them are no measurement at breast height.
+    let poor = found.sd_m > POOR * found.diameter_m && found.sd_m > stem_sd_m;
+    (agrees && !poor).then_some(found)
 }
 
 /// Points of the stem around breast height with their weights.
