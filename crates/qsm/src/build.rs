@@ -52,7 +52,15 @@ fn unfitted(points: &Points, branches: &[Branch], params: &Params) -> Built {
     let radii: Vec<Radius> = sections.all.iter().map(radius).collect();
     let measured = vec![None; radii.len()];
     let joints: Vec<Joints> = (0..branches.len()).map(|number| as_is(&sections, number)).collect();
-    let model = model(branches, &sections, &joints, &radii, &measured);
+    let whole: Vec<Branch> =
+        branches.iter().map(|branch| Branch { fork: None, ..branch.clone() }).collect();
+    let (mut model, _) = model(&whole, &sections, &joints, &radii, &measured);
+    for (number, branch) in branches.iter().enumerate() {
+        let Some(fork) = branch.fork else { continue };
+        let first = model.branches[number].first as usize;
+        model.branches[number].parent = Some(fork.branch);
+        model.cylinders[first].parent = Some(sections.at(fork.branch as usize, fork.at_m) as u32);
+    }
     Built { model, owner, noise_m: None, pipe: None }
 }
 
@@ -101,44 +109,87 @@ fn fitted(points: &Points, branches: Vec<Branch>, params: &Params) -> Built {
     begin(&mut branches, &sections, noise);
     let second = pass(points, &branches, first.noise_m, params);
     let Pass { sections, owner, measured, radii, joints, noise_m, pipe } = second;
-    let model = model(&branches, &sections, &joints, &radii, &measured);
+    let (model, cylinder_of) = model(&branches, &sections, &joints, &radii, &measured);
+    let owner = owner.iter().map(|section| cylinder_of[*section as usize]).collect();
     Built { model, owner, noise_m, pipe }
 }
 
-/// Puts sections, axes and radii together.
+/// Puts sections, axes and radii together. Second, the cylinder of every section: sections at the foot
+/// of a branch whose axis is still inside the wood that it grows on become part of that.
 fn model(
     branches: &[Branch],
     sections: &Sections,
     joints: &[Joints],
     radii: &[Radius],
     measured: &[Option<Measured>],
-) -> Model {
+) -> (Model, Vec<u32>) {
     let mut model = Model::default();
+    let mut cylinder_of = vec![0u32; sections.all.len()];
     for (number, branch) in branches.iter().enumerate() {
         let range = sections.of(number);
-        let mut parent =
-            branch.fork.map(|fork| sections.at(fork.branch as usize, fork.at_m) as u32);
-        for (ends, place) in joints[number].at_m.windows(2).zip(range.clone()) {
-            let Radius { radius_m, sd_m, source } = radii[place];
-            let fit = measured[place].map(|measured| measured.fit);
-            let fit = fit.filter(|_| source == RadiusSource::Measured);
-            model.cylinders.push(ModelCylinder {
-                solid: Cylinder { start_m: ends[0], end_m: ends[1], radius_m },
-                radius_sd_m: sd_m,
-                source,
-                arc_coverage: fit.map_or(0.0, |fit| fit.arc_coverage),
-                points: fit.map_or(0, |fit| fit.points),
-                parent,
-                branch: number as u32,
-            });
-            parent = Some(place as u32);
+        let at_m = &joints[number].at_m;
+        let fork = branch.fork.map(|fork| sections.at(fork.branch as usize, fork.at_m));
+        let mut parent = fork.map(|section| cylinder_of[section]);
+        let (inside, on) = match branch.fork {
+            Some(fork) => buried(&model, &model.branches[fork.branch as usize], at_m, parent),
+            None => (0, parent),
+        };
+        parent = on;
+        cylinder_of[range.clone()][..inside].fill(parent.unwrap_or(0));
+        let first = model.cylinders.len();
+        for (ends, place) in at_m.windows(2).zip(range.clone()).skip(inside) {
+            let next = model.cylinders.len() as u32;
+            let solid =
+                Cylinder { start_m: ends[0], end_m: ends[1], radius_m: radii[place].radius_m };
+            let fit = measured[place].filter(|_| radii[place].source == RadiusSource::Measured);
+            model.cylinders.push(cylinder(solid, &radii[place], fit.as_ref(), parent, number));
+            cylinder_of[place] = next;
+            parent = Some(next);
         }
         model.branches.push(ModelBranch {
             parent: branch.fork.map(|fork| fork.branch),
             order: branch.order,
-            first: range.start as u32,
-            len: range.len() as u32,
+            first: first as u32,
+            len: (model.cylinders.len() - first) as u32,
         });
     }
-    model
+    (model, cylinder_of)
+}
+
+fn cylinder(
+    solid: Cylinder,
+    radius: &Radius,
+    measured: Option<&Measured>,
+    parent: Option<u32>,
+    branch: usize,
+) -> ModelCylinder {
+    ModelCylinder {
+        solid,
+        radius_sd_m: radius.sd_m,
+        source: radius.source,
+        arc_coverage: measured.map_or(0.0, |measured| measured.fit.arc_coverage),
+        points: measured.map_or(0, |measured| measured.fit.points),
+        parent,
+        branch: branch as u32,
+    }
+}
+
+/// Number of sections at the foot of a branch that end inside the wood of the branch it grows on, and
+/// the cylinder of that which the first of the others grows on. One section is always left.
+fn buried(
+    model: &Model,
+    other: &ModelBranch,
+    at_m: &[[f64; 3]],
+    parent: Option<u32>,
+) -> (usize, Option<u32>) {
+    let (mut inside, mut on) = (0, parent);
+    for end in &at_m[1..at_m.len() - 1] {
+        let all = (other.first..).zip(model.cylinders_of(other));
+        let holds =
+            |(_, cylinder): &(u32, &ModelCylinder)| cylinder.solid.signed_distance_m(*end) <= 0.0;
+        let Some((place, _)) = all.into_iter().find(holds) else { break };
+        inside += 1;
+        on = Some(place);
+    }
+    (inside, on)
 }

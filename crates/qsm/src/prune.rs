@@ -54,7 +54,9 @@ fn rises(branch: &Branch, parent: &[Section], noise_m: f64) -> bool {
 
 /// How far out of a section a branch must rise, m.
 fn needed_m(section: &Section, noise_m: f64) -> f64 {
-    (RISE_RADII * section.radius_m).max(RISE_NOISES * noise_m)
+    let rise = RISE_RADII * section.radius_m;
+    // The noise is that of the stem's bark; a thin branch cannot have it.
+    rise.max(RISE_NOISES * noise_m.min(rise))
 }
 
 /// Distance from a position to the nearest surface of a branch, negative inside, and the section.

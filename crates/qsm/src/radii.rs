@@ -267,7 +267,8 @@ fn ratio_at(
             (a.log_ratio + (b.log_ratio - a.log_ratio) * share, own + lost)
         }
         [Some(one), None] | [None, Some(one)] => {
-            (one.log_ratio, one.log_sd * one.log_sd + forgotten(one) * scatter * scatter)
+            let kept = 1.0 - forgotten(one);
+            (one.log_ratio * kept, one.log_sd * one.log_sd + forgotten(one) * scatter * scatter)
         }
         [None, None] => return (0.0, scatter, RadiusSource::Inferred),
     };
