@@ -20,7 +20,7 @@ const BASE: [f64; 3] = [500_000.25, 5_000_000.5, 812.0];
 fn cloud(shift: [f64; 3]) -> PointCloud {
     let base: [f64; 3] = std::array::from_fn(|k| BASE[k] + shift[k]);
     let mut cloud = PointCloud::new(Frame::near(base));
-    // Points of a campaign lie on the lattice of 0.1 mm.
+    // Points of a campaign lie on the lattice of 0.1 mm; none here lies between two of its places.
     let mut push = |at: [f64; 3]| cloud.push_world(at.map(quantise), &Point::default());
     for i in 0..6000 {
         let (sin, cos) = libm::sincos(f64::from(i) * 2.4);
@@ -28,7 +28,7 @@ fn cloud(shift: [f64; 3]) -> PointCloud {
         let radius = 0.12 - 0.01 * z + 0.002 * libm::sin(f64::from(i) * 12.9);
         push([base[0] + radius * cos, base[1] + radius * sin, base[2] + z]);
         if i % 3 == 0 {
-            let (x, radius) = (0.1 + 0.9 * f64::from(i) / 6000.0, 0.03);
+            let (x, radius) = (0.100_03 + 0.9 * f64::from(i) / 6000.0, 0.03);
             let at = [base[0] + x, base[1] + radius * cos, base[2] + 2.0 + radius * sin];
             push(at);
         }

@@ -181,5 +181,5 @@ fn bare_trees_scanned_from_all_around() {
 
 #[test]
 fn trees_in_leaf_scanned_from_one_side() {
-    hold(&cases(true, &ScanParams::one_sided().with_step(0.12)), 0.005, 0.45);
+    hold(&cases(true, &ScanParams::one_sided().with_step(0.12)), 0.005, 0.25);
 }
