@@ -5,6 +5,8 @@
 //! points come piece by piece ([`Scene::points_in`], [`Scene::blocks`]), so that a scene may be
 //! larger than memory.
 //!
+//! [`terrestrial`] has trees piece by piece, with every cylinder known, and a terrestrial scanner.
+//!
 //! The same parameters give the same points, to the last bit, on every machine, with any number of
 //! threads and however the area is cut into pieces. This crate writes no file and knows nothing of
 //! the pipeline.

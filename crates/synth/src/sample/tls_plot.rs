@@ -27,7 +27,7 @@ const DTM_CELL_M: f64 = 0.25;
 /// The sample's plot.
 ///
 /// # Errors
-/// None with the sample's own parameters; see [`plot`].
+/// None with the sample's own parameters; see [`plot()`].
 pub fn tls_plot_scene() -> Result<PlotScene, Error> {
     let scan = ScanParams { step_deg: STEP_DEG, max_range_m: 40.0, ..ScanParams::tls() };
     plot(SEED, &PlotParams { scan, ..PlotParams::default() })
@@ -36,7 +36,7 @@ pub fn tls_plot_scene() -> Result<PlotScene, Error> {
 /// The sample: thinned points of five scan positions, truth, and the campaign file.
 ///
 /// # Errors
-/// None with the sample's own parameters; see [`plot`].
+/// None with the sample's own parameters; see [`plot()`].
 pub fn tls_plot() -> Result<SampleStand, Error> {
     let scene = tls_plot_scene()?;
     let points = thinned(&scene, &scene.scan());
@@ -71,7 +71,11 @@ fn tile(points: &LabelledPoints, source_id: u16) -> SampleTile {
     }
     let rect: Rect = cloud.bounds().rect();
     let [dx, dy, _] = cloud.frame.origin_m.map(|value| value as f64);
-    SampleTile { name: format!("scans/position_{source_id}.laz"), rect: rect.moved([dx, dy]), cloud }
+    SampleTile {
+        name: format!("scans/position_{source_id}.laz"),
+        rect: rect.moved([dx, dy]),
+        cloud,
+    }
 }
 
 const CAMPAIGN_TOML: &str = r#"# A virtual terrestrial survey of a plot of 22 x 22 m: what `cargo xtask sample` wrote.

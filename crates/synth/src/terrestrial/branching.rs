@@ -2,6 +2,7 @@
 
 use super::axis::{Assembly, Axis, AxisNode, Place};
 use super::envelope::Envelope;
+use super::growth::{Limb, left_of_radius};
 use super::leaves;
 use super::size::TreeSize;
 use super::species::{BranchingHabit, TreeSpecies};
@@ -27,6 +28,8 @@ pub(crate) struct Crown {
     conifer: bool,
     size: TreeSize,
     envelope: Envelope,
+    /// What has its own share of the stem.
+    limbs: Vec<Limb>,
     stream: Stream,
     pub(crate) tree: Assembly,
     /// Height of the lowest living branch, m.
@@ -51,12 +54,14 @@ impl Crown {
         species: TreeSpecies,
         size: &TreeSize,
         stem: &Axis,
+        limbs: Vec<Limb>,
         stream: Stream,
         tree: Assembly,
     ) -> Self {
         let envelope = Envelope::new(species, size, stem);
         let (habit, conifer) = (species.habit(), species.is_conifer());
-        Self { habit, conifer, size: *size, envelope, stream, tree, lowest_m: f64::INFINITY }
+        let (size, lowest_m) = (*size, f64::INFINITY);
+        Self { habit, conifer, size, envelope, limbs, stream, tree, lowest_m }
     }
 
     /// Everything that a leader bears: living branches in its crown, dead ones below.
@@ -122,7 +127,7 @@ impl Crown {
         let [fewest, most] = self.habit.whorl;
         let count = fewest + (self.stream.unit() * f64::from(most - fewest + 1)) as u32;
         let between = if self.conifer { 2 } else { 0 };
-        let leaving = leaving_radius_m(leader.place(s).radius, leader.place(next).radius);
+        let leaving = self.leaving_m(leader, s, next);
         let weights: Vec<f64> = (0..count + between)
             .map(|i| self.stream.within(0.7, 1.3) * if i < count { 1.0 } else { 0.25 })
             .collect();
@@ -139,6 +144,13 @@ impl Crown {
         }
     }
 
+    /// Radius of all that leaves a leader between two places besides its limbs, m.
+    fn leaving_m(&self, leader: &Axis, s: f64, next: f64) -> f64 {
+        let limbs = if leader.order == 0 { self.limbs.as_slice() } else { &[] };
+        let kept = left_of_radius(limbs, next) / left_of_radius(limbs, s);
+        leaving_radius_m(leader.place(s).radius, leader.place(next).radius / kept)
+    }
+
     /// A living branch of a leader.
     fn main_branch(&mut self, leader: &Axis, s: f64, turn_deg: f64, radius: f64, vigour: f64) {
         let place = leader.place(s);
@@ -148,7 +160,8 @@ impl Crown {
         let direction = from_axis(place.direction, turn_deg, angle);
         let reach = if self.conifer {
             let sine = libm::sin(angle.to_radians()).max(0.5);
-            self.envelope.radius_at(depth) / sine
+            // No branch outgrows its leader.
+            (self.envelope.radius_at(depth) / sine).min(0.8 * (leader.length() - s))
         } else {
             let limit = 1.35 * SLENDERNESS * libm::pow(radius.max(0.004), 2.0 / 3.0);
             self.envelope.room_m(place.at, direction, limit)

@@ -5,8 +5,13 @@ use timberline_pointcloud::Bounds3;
 
 /// Things in a leaf of the hierarchy.
 const LEAF: usize = 4;
-/// Levels below which the hierarchy is not divided further; median splits never need as many.
-const DEEPEST: usize = 48;
+/// Slices among which the best cut is sought.
+const BINS: usize = 16;
+/// Level from which on nodes are divided at the median, which bounds the depth.
+const MEDIAN_BELOW: usize = 28;
+/// Room for the nodes that wait for a visit: one for each level, and 32 levels of halves hold all
+/// that a 32-bit number can count.
+const DEEPEST: usize = MEDIAN_BELOW + 34;
 
 /// A box of the hierarchy.
 #[derive(Debug, Clone, Copy)]
@@ -20,7 +25,7 @@ struct Node {
     axis: u8,
 }
 
-/// Boxes over boxes, divided at the median of the longest axis.
+/// Boxes over boxes, divided across the longest axis.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Bvh {
     nodes: Vec<Node>,
@@ -31,16 +36,14 @@ pub(crate) struct Bvh {
 impl Bvh {
     /// The hierarchy of the boxes of some things.
     pub(crate) fn build(boxes: &[Bounds3]) -> Self {
-        let centres: Vec<Vec3> = boxes
-            .iter()
-            .map(|b| std::array::from_fn(|i| 0.5 * (b.min[i] + b.max[i])))
-            .collect();
+        let centres: Vec<Vec3> =
+            boxes.iter().map(|b| std::array::from_fn(|i| 0.5 * (b.min[i] + b.max[i]))).collect();
         let mut order: Vec<u32> = (0..boxes.len() as u32).collect();
-        let mut nodes = Vec::with_capacity(boxes.len());
+        let mut build = Build { boxes, centres, nodes: Vec::with_capacity(boxes.len()) };
         if !boxes.is_empty() {
-            divide(&mut nodes, &mut order, 0, boxes, &centres);
+            build.divide(&mut order, 0, 0);
         }
-        Self { nodes, order }
+        Self { nodes: build.nodes, order }
     }
 
     /// The box around everything.
@@ -117,34 +120,96 @@ impl Bvh {
     }
 }
 
-/// Builds the node over `order`, whose first element has place `first` of the whole, and all below it.
-fn divide(
-    nodes: &mut Vec<Node>,
-    order: &mut [u32],
-    first: usize,
-    boxes: &[Bounds3],
-    centres: &[Vec3],
-) {
-    let whole = |bounds: Bounds3, &index: &u32| bounds.union(&boxes[index as usize]);
-    let bounds = order.iter().fold(Bounds3::EMPTY, whole);
-    let index = nodes.len();
-    nodes.push(Node { bounds, at: first as u32, count: order.len() as u32, axis: 0 });
-    if order.len() <= LEAF {
-        return;
+/// The boxes that a hierarchy is built of.
+struct Build<'a> {
+    boxes: &'a [Bounds3],
+    centres: Vec<Vec3>,
+    nodes: Vec<Node>,
+}
+
+impl Build<'_> {
+    /// Builds the node over `order`, whose first element has place `first` of the whole, and all
+    /// below it.
+    fn divide(&mut self, order: &mut [u32], first: usize, depth: usize) {
+        let whole = |bounds: Bounds3, &index: &u32| bounds.union(&self.boxes[index as usize]);
+        let bounds = order.iter().fold(Bounds3::EMPTY, whole);
+        let index = self.nodes.len();
+        self.nodes.push(Node { bounds, at: first as u32, count: order.len() as u32, axis: 0 });
+        if order.len() <= LEAF {
+            return;
+        }
+        let mut spread = Bounds3::EMPTY;
+        order.iter().for_each(|&thing| spread.include(self.centres[thing as usize]));
+        let edge = |axis: usize| spread.max[axis] - spread.min[axis];
+        let axis = (1..3).fold(0, |best, axis| if edge(axis) > edge(best) { axis } else { best });
+        let bins = Bins { axis, low: spread.min[axis], edge: edge(axis) };
+        let cut = if depth < MEDIAN_BELOW { self.cheapest(order, &bins) } else { None };
+        let middle = match cut {
+            Some(cut) => bins.partition(order, &self.centres, cut),
+            None => self.at_median(order, axis),
+        };
+        let (low, high) = order.split_at_mut(middle);
+        self.divide(low, first, depth + 1);
+        let second = self.nodes.len() as u32;
+        self.divide(high, first + middle, depth + 1);
+        self.nodes[index] = Node { bounds, at: second, count: 0, axis: axis as u8 };
     }
-    let mut spread = Bounds3::EMPTY;
-    order.iter().for_each(|&thing| spread.include(centres[thing as usize]));
-    let edge = |axis: usize| spread.max[axis] - spread.min[axis];
-    let axis = (1..3).fold(0, |best, axis| if edge(axis) > edge(best) { axis } else { best });
-    let middle = order.len() / 2;
-    order.select_nth_unstable_by(middle, |&a, &b| {
-        centres[a as usize][axis].total_cmp(&centres[b as usize][axis]).then(a.cmp(&b))
-    });
-    let (low, high) = order.split_at_mut(middle);
-    divide(nodes, low, first, boxes, centres);
-    let second = nodes.len() as u32;
-    divide(nodes, high, first + middle, boxes, centres);
-    nodes[index] = Node { bounds, at: second, count: 0, axis: axis as u8 };
+
+    fn at_median(&self, order: &mut [u32], axis: usize) -> usize {
+        let middle = order.len() / 2;
+        order.select_nth_unstable_by(middle, |&a, &b| {
+            let at = |thing: u32| self.centres[thing as usize][axis];
+            at(a).total_cmp(&at(b)).then(a.cmp(&b))
+        });
+        middle
+    }
+
+    /// The cut between bins after which rays meet the least (the surface area heuristic, binned: Wald
+    /// 2007, On fast construction of SAH-based bounding volume hierarchies); `None` where all
+    /// centres lie in one bin.
+    fn cheapest(&self, order: &[u32], bins: &Bins) -> Option<usize> {
+        let mut held = [(0_u32, Bounds3::EMPTY); BINS];
+        for &thing in order {
+            let bin = bins.of(self.centres[thing as usize]);
+            held[bin].0 += 1;
+            held[bin].1 = held[bin].1.union(&self.boxes[thing as usize]);
+        }
+        let sum = |some: &[(u32, Bounds3)]| {
+            let all = some.iter().fold((0, Bounds3::EMPTY), |a, b| (a.0 + b.0, a.1.union(&b.1)));
+            (all.0 > 0).then(|| f64::from(all.0) * half_area(&all.1))
+        };
+        let cost = |cut: usize| Some((cut, sum(&held[..cut])? + sum(&held[cut..])?));
+        (1..BINS).filter_map(cost).min_by(|a, b| a.1.total_cmp(&b.1)).map(|(cut, _)| cut)
+    }
+}
+
+/// Equal slices of the range of the centres on an axis.
+struct Bins {
+    axis: usize,
+    low: f64,
+    edge: f64,
+}
+
+impl Bins {
+    fn of(&self, centre: Vec3) -> usize {
+        let share = (centre[self.axis] - self.low) / self.edge;
+        // A range of nothing gives NaN, which is bin 0.
+        ((share * BINS as f64) as usize).min(BINS - 1)
+    }
+
+    /// Moves the things of the bins below the cut to the front, in their order; returns their number.
+    fn partition(&self, order: &mut [u32], centres: &[Vec3], cut: usize) -> usize {
+        let below = |thing: &u32| self.of(centres[*thing as usize]) < cut;
+        let (low, high): (Vec<u32>, Vec<u32>) = order.iter().partition(|thing| below(thing));
+        order[..low.len()].copy_from_slice(&low);
+        order[low.len()..].copy_from_slice(&high);
+        low.len()
+    }
+}
+
+fn half_area(bounds: &Bounds3) -> f64 {
+    let [x, y, z] = std::array::from_fn(|axis| bounds.max[axis] - bounds.min[axis]);
+    x * y + y * z + z * x
 }
 
 /// Whether a ray enters a box grown by a radius before a range (slabs; Kay and Kajiya 1986). A ray within a slab's face
@@ -161,9 +226,8 @@ fn enters(bounds: &Bounds3, radius: f64, origin: Vec3, inverse: Vec3, limit: f64
 }
 
 fn distance_to_box(bounds: &Bounds3, point: Vec3) -> f64 {
-    let out = |axis: usize| {
-        (bounds.min[axis] - point[axis]).max(point[axis] - bounds.max[axis]).max(0.0)
-    };
+    let out =
+        |axis: usize| (bounds.min[axis] - point[axis]).max(point[axis] - bounds.max[axis]).max(0.0);
     let [x, y, z] = [out(0), out(1), out(2)];
     (x * x + y * y + z * z).sqrt()
 }

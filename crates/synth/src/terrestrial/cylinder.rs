@@ -1,6 +1,6 @@
 //! The pieces of wood: truncated cones, with exact volume, distance and intersection.
 
-use super::vector::{Vec3, add, across, along, dot, length, scale, sub, unit};
+use super::vector::{Vec3, across, add, along, dot, length, scale, sub, unit};
 use serde::{Deserialize, Serialize};
 use timberline_pointcloud::Bounds3;
 
@@ -186,7 +186,11 @@ impl Solid {
             return None;
         }
         let root = root.sqrt();
-        let times = if a > 0.0 { [(-b - root) / a, (-b + root) / a] } else { [(-b + root) / a, (-b - root) / a] };
+        let times = if a > 0.0 {
+            [(-b - root) / a, (-b + root) / a]
+        } else {
+            [(-b + root) / a, (-b - root) / a]
+        };
         let [sin, cos] = self.taper;
         times.into_iter().filter(|&t| t > 0.0).find_map(|t| {
             let u = ou + t * du;
@@ -216,8 +220,7 @@ impl Solid {
         let (b, radius) = (dot(from, direction), self.ball(end));
         let root = b * b - dot(from, from) + radius * radius;
         let t = -b - root.max(0.0).sqrt();
-        (root > 0.0 && t > 0.0)
-            .then(|| (t, unit(along(from, direction, t))))
+        (root > 0.0 && t > 0.0).then(|| (t, unit(along(from, direction, t))))
     }
 }
 

@@ -33,7 +33,8 @@ impl GroundMesh {
         let low = heights.iter().copied().fold(f64::INFINITY, f64::min);
         let high = heights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         let rise = |a: usize, b: usize| (heights[b] - heights[a]).abs();
-        let right = (0..heights.len()).filter(|i| i % size[0] + 1 < size[0]).map(|i| rise(i, i + 1));
+        let right =
+            (0..heights.len()).filter(|i| i % size[0] + 1 < size[0]).map(|i| rise(i, i + 1));
         let up = (0..heights.len() - size[0]).map(|i| rise(i, i + size[0]));
         let steepest = right.chain(up).fold(0.0, f64::max) / cell * std::f64::consts::SQRT_2;
         Self { corner: rect.min, cell, size, heights, low, high, steepest }

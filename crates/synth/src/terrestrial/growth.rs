@@ -35,10 +35,12 @@ pub fn grow(species: TreeSpecies, size: &TreeSize, seed: u64) -> Result<TreeMode
     let mut stream = Stream::new(seed, Domain::Growth, 0);
     let mut tree = Assembly::default();
     let habit = species.habit();
+    let fork = size.fork_m.map(|height_m| Limb { height_m, share: FORK_SHARE });
     let limbs = limbs(species, size, &mut stream);
-    let stem = stem(size, habit, &limbs, &mut stream, &mut tree);
+    let given_off: Vec<Limb> = limbs.iter().copied().chain(fork).collect();
+    let stem = stem(size, habit, &given_off, &mut stream, &mut tree);
     let second = size.fork_m.map(|fork| second_leader(&stem, fork, habit, &mut stream, &mut tree));
-    let mut crown = Crown::new(species, size, &stem, stream, tree);
+    let mut crown = Crown::new(species, size, &stem, given_off, stream, tree);
     limbs.iter().for_each(|limb| crown.limb(&stem, limb.height_m, limb.share));
     crown.bear(&stem);
     if let Some(leader) = second {
@@ -55,12 +57,22 @@ pub fn grow(species: TreeSpecies, size: &TreeSize, seed: u64) -> Result<TreeMode
     })
 }
 
-/// A thick branch, for which the stem itself gets thinner.
+/// A thick branch or second leader, for which the stem itself gets thinner.
 #[derive(Debug, Clone, Copy)]
-struct Limb {
+pub(crate) struct Limb {
     height_m: f64,
     /// Its share of the cross-section of the stem below.
     share: f64,
+}
+
+/// What limbs leave of the radius of the stem at a distance from its foot: the cross-sections are
+/// shared.
+pub(crate) fn left_of_radius(limbs: &[Limb], along_m: f64) -> f64 {
+    let left = |limb: &Limb| {
+        let passed = ((along_m - limb.height_m) / FORK_LENGTH_M).clamp(0.0, 1.0);
+        1.0 + passed * ((1.0 - limb.share).sqrt() - 1.0)
+    };
+    limbs.iter().map(left).product()
 }
 
 /// The limbs of a broadleaved tree: some in the lower two thirds of its crown.
@@ -88,10 +100,6 @@ fn stem(
     stream: &mut Stream,
     tree: &mut Assembly,
 ) -> Axis {
-    let fork = size.fork_m.map(|height_m| Limb { height_m, share: FORK_SHARE });
-    let left = |height: f64| -> f64 {
-        limbs.iter().chain(&fork).map(|limb| limb.left_of_radius(height)).product()
-    };
     let taper = StemTaper {
         breast_radius_m: 0.5 * size.dbh_m,
         length_m: size.height_m,
@@ -105,7 +113,7 @@ fn stem(
     let mut at: Vec3 = [0.0; 3];
     let mut nodes = Vec::with_capacity(heights.len());
     for (index, &height) in heights.iter().enumerate() {
-        let radius = (taper.radius_m(height) * left(height)).max(TIP_RADIUS_M);
+        let radius = (taper.radius_m(height) * left_of_radius(limbs, height)).max(TIP_RADIUS_M);
         nodes.push(AxisNode { at, radius });
         if let Some(next) = heights.get(index + 1) {
             let share = 0.5 * (height + next) / size.height_m;
@@ -128,14 +136,6 @@ fn node_heights(height_m: f64) -> Vec<f64> {
     let steps = ((height_m - low) / STEM_STEP_M).ceil().max(1.0);
     heights.extend((1..=steps as u32).map(|i| low + (height_m - low) * f64::from(i) / steps));
     heights
-}
-
-impl Limb {
-    /// What it leaves of the radius of the stem: the cross-sections are shared.
-    fn left_of_radius(&self, height: f64) -> f64 {
-        let passed = ((height - self.height_m) / FORK_LENGTH_M).clamp(0.0, 1.0);
-        1.0 + passed * ((1.0 - self.share).sqrt() - 1.0)
-    }
 }
 
 /// The other leader of a forked stem: leaves it at an angle and rises beside it.

@@ -5,7 +5,7 @@
 //! makes one from a [`TreeSpecies`], a [`TreeSize`] and a seed; [`shapes`] has a pole, a bent tube and a
 //! fork for exact tests. [`scan_tree`] looks at a single tree as [`ScanParams`] say: from tripods all
 //! around ([`ScanParams::tls`]), from one side ([`ScanParams::one_sided`]), from a drone
-//! ([`ScanParams::uav`]), without any error ([`ScanParams::exact`]). [`plot`] plants several trees and
+//! ([`ScanParams::uav`]), without any error ([`ScanParams::exact`]). [`plot()`] plants several trees and
 //! understorey on a slope; [`PlotScene::scan`] scans them from the plot's positions.
 //!
 //! A pulse is five rays over the beam's footprint. Where they end at surfaces close together their

@@ -143,7 +143,8 @@ impl Window {
         let centre_deg = libm::atan2(middle[1], middle[0]).to_degrees();
         let mut half_deg = 0.0_f64;
         for (x, y) in [(0, 0), (0, 1), (1, 0), (1, 1)] {
-            let corner = [[rect.min[0], rect.max[0]][x] - at[0], [rect.min[1], rect.max[1]][y] - at[1]];
+            let corner =
+                [[rect.min[0], rect.max[0]][x] - at[0], [rect.min[1], rect.max[1]][y] - at[1]];
             let azimuth = libm::atan2(corner[1], corner[0]).to_degrees();
             half_deg = half_deg.max(turn_between(azimuth, centre_deg).abs());
         }

@@ -49,8 +49,7 @@ mod tests {
 
     #[test]
     fn exact_at_breast_height_and_never_thicker_above() {
-        let taper =
-            StemTaper { breast_radius_m: 0.15, length_m: 24.0, exponent: 0.75, flare: 0.3 };
+        let taper = StemTaper { breast_radius_m: 0.15, length_m: 24.0, exponent: 0.75, flare: 0.3 };
         assert!((taper.radius_m(1.3) - 0.15).abs() < 1e-12);
         let radii: Vec<f64> = (0..=240).map(|i| taper.radius_m(f64::from(i) * 0.1)).collect();
         assert!(radii.windows(2).all(|pair| pair[1] <= pair[0]));

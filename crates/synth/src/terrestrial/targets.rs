@@ -111,7 +111,8 @@ impl Targets {
             let ground = ground.and_then(|mesh| mesh.hit(ray.origin, ray.direction, range));
             let owner = self.owners.get(thing as usize);
             let on_thing = owner.map(|&owner| RayHit { range, normal, owner });
-            *hit = ground.map(|(range, normal)| RayHit { range, normal, owner: GROUND }).or(on_thing);
+            *hit =
+                ground.map(|(range, normal)| RayHit { range, normal, owner: GROUND }).or(on_thing);
         }
         hits
     }

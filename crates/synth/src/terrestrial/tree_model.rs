@@ -79,8 +79,8 @@ impl TreeModel {
             let length = piece.length_m();
             if along_m <= below + length && length > 0.0 {
                 let share = ((along_m - below) / length).max(0.0);
-                let radius = piece.start_radius_m
-                    + share * (piece.end_radius_m - piece.start_radius_m);
+                let radius =
+                    piece.start_radius_m + share * (piece.end_radius_m - piece.start_radius_m);
                 let way = sub(piece.end_m, piece.start_m);
                 return Some((along(piece.start_m, way, share), 2.0 * radius));
             }
@@ -113,11 +113,12 @@ impl TreeModel {
     pub fn volume_m3(&self, class: VolumeClass) -> f64 {
         let of_class = |piece: &&TrueCylinder| {
             let thick = piece.mean_diameter_m() >= THICK_DIAMETER_M;
-            class == match (piece.order, thick) {
-                (0, _) => VolumeClass::Stem,
-                (_, true) => VolumeClass::ThickBranches,
-                (_, false) => VolumeClass::ThinBranches,
-            }
+            class
+                == match (piece.order, thick) {
+                    (0, _) => VolumeClass::Stem,
+                    (_, true) => VolumeClass::ThickBranches,
+                    (_, false) => VolumeClass::ThinBranches,
+                }
         };
         self.cylinders.iter().filter(of_class).map(TrueCylinder::volume_m3).sum()
     }
@@ -147,7 +148,8 @@ impl TreeModel {
     pub fn crown_area_m2(&self) -> f64 {
         let low = self.base_m[2] + self.crown_base_height_m;
         let wood = self.cylinders.iter().filter(|piece| piece.end_m[2] >= low);
-        let ends = wood.map(|piece| piece.end_m).chain(self.leaves.iter().map(|leaf| leaf.centre_m));
+        let ends =
+            wood.map(|piece| piece.end_m).chain(self.leaves.iter().map(|leaf| leaf.centre_m));
         hull_area_m2(ends.map(|p| [p[0] - self.base_m[0], p[1] - self.base_m[1]]).collect())
     }
 
@@ -188,8 +190,7 @@ fn joints(cylinders: &[TrueCylinder]) -> Vec<[Joint; 2]> {
         None => Joint::Flat,
         Some(_) => Joint::Buried,
     };
-    let mut joints: Vec<_> =
-        cylinders.iter().map(|piece| [start(piece), Joint::Flat]).collect();
+    let mut joints: Vec<_> = cylinders.iter().map(|piece| [start(piece), Joint::Flat]).collect();
     for piece in cylinders {
         if let Some(parent) = piece.parent
             && let (Some(ends), Some(below)) =

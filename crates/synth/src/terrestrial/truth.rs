@@ -54,7 +54,7 @@ pub fn cylinders(scene: &PlotScene, least_radius_m: f64) -> String {
                 continue;
             }
             let parent = piece.parent.map_or(0, |parent| parent + 1);
-            let mut row = vec![tree.id, piece.id + 1, parent, piece.branch, u32::from(piece.order)]
+            let mut row = [tree.id, piece.id + 1, parent, piece.branch, u32::from(piece.order)]
                 .iter()
                 .map(u32::to_string)
                 .collect::<Vec<_>>();

@@ -74,7 +74,13 @@ pub(crate) fn shrub(base_m: Vec3, stream: &mut Stream) -> TreeModel {
 }
 
 /// A slightly crooked shoot.
-fn shoot(from: Vec3, direction: Vec3, length: f64, radius: f64, stream: &mut Stream) -> Vec<AxisNode> {
+fn shoot(
+    from: Vec3,
+    direction: Vec3,
+    length: f64,
+    radius: f64,
+    stream: &mut Stream,
+) -> Vec<AxisNode> {
     let steps = (length / 0.2).ceil().max(2.0);
     let (mut at, mut direction) = (from, direction);
     let mut nodes = vec![AxisNode { at, radius }];

@@ -15,11 +15,8 @@ fn piece(end_m: Vec3, radii: [f64; 2]) -> TrueCylinder {
     }
 }
 
-const ENDS: [[Joint; 2]; 3] = [
-    [Joint::Flat, Joint::Flat],
-    [Joint::Buried, Joint::Ball],
-    [Joint::Flat, Joint::Ball],
-];
+const ENDS: [[Joint; 2]; 3] =
+    [[Joint::Flat, Joint::Flat], [Joint::Buried, Joint::Ball], [Joint::Flat, Joint::Ball]];
 
 proptest! {
     #[test]

@@ -7,7 +7,10 @@ fn small() -> PlotParams {
         edge_m: 10.0,
         trees: vec![
             of(TreeSpecies::NorwaySpruce, 0.2),
-            (TreeSpecies::EuropeanBeech, TreeSize::of_dbh(TreeSpecies::EuropeanBeech, 0.15).leafless()),
+            (
+                TreeSpecies::EuropeanBeech,
+                TreeSize::of_dbh(TreeSpecies::EuropeanBeech, 0.15).leafless(),
+            ),
         ],
         positions: 3,
         scan: ScanParams::tls().with_step(0.4),
@@ -55,7 +58,8 @@ fn labels_tell_what_points_lie_on() {
     }
     let of_tree = |i: usize| matches!(points.label[i], Label::Wood | Label::Leaf);
     assert!((0..points.len()).all(|i| of_tree(i) == (points.tree_id[i] > 0)));
-    let stations: std::collections::BTreeSet<u16> = points.cloud.source_id.iter().copied().collect();
+    let stations: std::collections::BTreeSet<u16> =
+        points.cloud.source_id.iter().copied().collect();
     assert_eq!(stations.into_iter().collect::<Vec<_>>(), [1, 2, 3]);
 }
 

@@ -21,7 +21,8 @@ fn beech() -> TreeModel {
 
 #[test]
 fn without_noise_points_lie_on_the_surface() {
-    for shape in [pole(6.0, 0.2, 0.1), bent_tube(4.0, 80.0, 0.1, 40), y_fork(2.0, 2.5, 30.0, 0.15, 0.1)]
+    for shape in
+        [pole(6.0, 0.2, 0.1), bent_tube(4.0, 80.0, 0.1, 40), y_fork(2.0, 2.5, 30.0, 0.15, 0.1)]
     {
         let points = scan_tree(&shape, &coarse().exact(), 1).unwrap();
         assert!(points.len() > 500);
@@ -51,7 +52,7 @@ fn noise_is_along_the_beam_and_of_its_size() {
         }
     }
     let rms = (squares.iter().sum::<f64>() / squares.len() as f64).sqrt();
-    assert!(squares.len() > 300 && (rms - 0.004).abs() < 0.0006, "{rms} of {}", squares.len());
+    assert!(squares.len() > 200 && (rms - 0.004).abs() < 0.0006, "{rms} of {}", squares.len());
 }
 
 #[test]
@@ -74,14 +75,16 @@ fn nothing_is_seen_behind_wood() {
 
 #[test]
 fn density_falls_with_the_square_of_range() {
-    let count = |distance| scan_tree(&pole(2.0, 0.2, 0.2), &one_position(distance), 1).unwrap().len();
+    let count =
+        |distance| scan_tree(&pole(2.0, 0.2, 0.2), &one_position(distance), 1).unwrap().len();
     let ratio = count(5.0) as f64 / count(10.0) as f64;
     assert!((3.2..5.0).contains(&ratio), "{ratio}");
 }
 
 #[test]
 fn one_sided_scans_show_less_than_half_of_a_stem() {
-    let points = scan_tree(&pole(2.0, 0.2, 0.2), &ScanParams::one_sided().with_step(0.2), 1).unwrap();
+    let points =
+        scan_tree(&pole(2.0, 0.2, 0.2), &ScanParams::one_sided().with_step(0.2), 1).unwrap();
     let mut sectors = [false; 36];
     for i in 0..points.len() {
         let [x, y, z] = points.cloud.world(i);
@@ -94,17 +97,18 @@ fn one_sided_scans_show_less_than_half_of_a_stem() {
     assert!((12..23).contains(&seen), "{seen}");
 }
 
-/// Two posts, one 10 cm behind the edge of the other.
+/// Two posts, the edge of one before the middle of the other.
 #[test]
 fn pulses_on_an_edge_give_points_between_the_surfaces() {
     let mut pair = pole(2.0, 0.15, 0.15);
-    pair.cylinders.extend(pole(2.0, 0.15, 0.15).at([0.2, 0.12, 0.0]).cylinders);
-    let broad = ScanParams { divergence_mrad: 3.0, ..one_position(8.0) };
+    pair.cylinders.extend(pole(2.0, 0.15, 0.15).at([0.15, 0.15, 0.0]).cylinders);
+    let broad = ScanParams { divergence_mrad: 5.0, ..one_position(8.0) };
     let points = scan_tree(&pair, &broad, 1).unwrap();
     let off = |i: usize| pair.distance_m(points.cloud.world(i));
     let mixed: Vec<f64> = (0..points.len()).filter(|&i| points.mixed[i]).map(off).collect();
     assert!(mixed.len() > 20, "{}", mixed.len());
-    assert!(mixed.iter().filter(|&&distance| distance > 0.01).count() > 5);
+    let between = mixed.iter().filter(|&&distance| distance > 0.01).count();
+    assert!(between > 5, "{between} of {}", mixed.len());
     let sharp = scan_tree(&pair, &one_position(8.0).exact(), 1).unwrap();
     assert!(!sharp.mixed.contains(&true));
 }
@@ -125,7 +129,11 @@ fn a_leafy_crown_gives_leaves_wood_and_several_returns() {
         .map(|i| surface.signed_distance_m(points.cloud.world(i)).abs())
         .collect();
     off.sort_unstable_by(f64::total_cmp);
-    assert!(off[off.len() / 2] < 0.004 && off[off.len() * 19 / 20] < 0.02, "{}", off[off.len() / 2]);
+    assert!(
+        off[off.len() / 2] < 0.004 && off[off.len() * 19 / 20] < 0.02,
+        "{}",
+        off[off.len() / 2]
+    );
 }
 
 #[test]
@@ -148,7 +156,8 @@ fn threads_do_not_matter() {
 
 #[test]
 fn parameters_out_of_range_are_refused() {
-    let told = |params: ScanParams| scan_tree(&pole(2.0, 0.1, 0.1), &params, 1).unwrap_err().to_string();
+    let told =
+        |params: ScanParams| scan_tree(&pole(2.0, 0.1, 0.1), &params, 1).unwrap_err().to_string();
     assert!(told(coarse().with_step(0.0)).contains("step_deg` is 0"));
     assert!(told(ScanParams { sensitivity: f64::NAN, ..coarse() }).contains("sensitivity` is NaN"));
     assert!(told(ScanParams { max_returns: 0, ..coarse() }).contains("max_returns` is 0"));
