@@ -51,7 +51,7 @@ impl Cover {
         while self.cells.len() > 1 && (points as f64) < POINTS_PER_CELL * self.cells.len() as f64 {
             self.coarsen();
         }
-        (points > 0).then(|| self.cells.len() as f64 * self.cell_m * self.cell_m)
+        (points > 0).then_some(self.cells.len() as f64 * self.cell_m * self.cell_m)
     }
 }
 

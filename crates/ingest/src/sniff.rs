@@ -25,12 +25,16 @@ pub(crate) fn format(source: &mut dyn Source) -> Result<Format, Error> {
     let mut bytes = vec![0; source.byte_len()?.min(BEGINNING) as usize];
     source.read_at(0, &mut bytes, "the beginning")?;
     let starts = |magic: &[u8]| bytes.starts_with(magic);
-    Ok(match () {
-        () if starts(b"ASTM-E57") => Format::E57,
-        () if starts(b"ply\n") || starts(b"ply\r") => Format::Ply,
-        () if is_pcd(&bytes) => Format::Pcd,
-        () if is_text(&bytes) => Format::Text,
-        () => Format::Las,
+    Ok(if starts(b"ASTM-E57") {
+        Format::E57
+    } else if starts(b"ply\n") || starts(b"ply\r") {
+        Format::Ply
+    } else if is_pcd(&bytes) {
+        Format::Pcd
+    } else if is_text(&bytes) {
+        Format::Text
+    } else {
+        Format::Las
     })
 }
 

@@ -5,7 +5,6 @@
 //! tiles begin at whole metres, so no voxel lies in two tiles, and what is kept depends neither on the
 //! tiles nor on the sequence of points. All is reckoned in whole ticks of 0.1 mm, so it is exact.
 
-use std::collections::BTreeMap;
 use timberline_pointcloud::PointCloud;
 use timberline_pointcloud::frame::{TICKS_PER_M, ticks_from_world};
 
@@ -30,23 +29,29 @@ impl Voxels {
 
     /// Indices of the points that are kept, ascending. The cloud must be in canonical order.
     pub(crate) fn keep(self, cloud: &PointCloud) -> Vec<u32> {
-        let ticks: Vec<[i64; 3]> =
-            (0..cloud.len()).map(|index| cloud.world(index).map(ticks_from_world)).collect();
-        let mut sums: BTreeMap<[i64; 3], Sum> = BTreeMap::new();
-        for at in &ticks {
-            sums.entry(self.of(*at)).or_default().add(*at);
-        }
-        let mut nearest: BTreeMap<[i64; 3], (u128, u32)> = BTreeMap::new();
-        for (index, at) in (0..).zip(&ticks) {
-            let voxel = self.of(*at);
-            let Some(sum) = sums.get(&voxel) else { continue };
-            let distance = sum.scaled_distance(*at);
-            let best = nearest.entry(voxel).or_insert((distance, index));
-            if distance < best.0 {
-                *best = (distance, index);
-            }
-        }
-        let mut kept: Vec<u32> = nearest.into_values().map(|(_, index)| index).collect();
+        let ticks = |index: u32| cloud.world(index as usize).map(ticks_from_world);
+        // Relative to the frame's origin, which is at whole metres, voxels have 32 bits.
+        let origin = cloud.frame.origin_m.map(|origin_m| origin_m * self.per_m);
+        let voxel = |index: u32| {
+            let voxel = self.of(ticks(index));
+            let relative: [i64; 3] = std::array::from_fn(|axis| voxel[axis] - origin[axis]);
+            relative.map(|place| place as i32)
+        };
+        let mut places: Vec<([i32; 3], u32)> =
+            (0..cloud.len() as u32).map(|index| (voxel(index), index)).collect();
+        places.sort_unstable();
+        let mut kept: Vec<u32> = places
+            .chunk_by(|a, b| a.0 == b.0)
+            .filter_map(|points| {
+                let mut sum = Sum::default();
+                points.iter().for_each(|(_, index)| sum.add(ticks(*index)));
+                // The first of several that are equally near: they come in canonical order.
+                points
+                    .iter()
+                    .map(|(_, index)| *index)
+                    .min_by_key(|i| sum.scaled_distance(ticks(*i)))
+            })
+            .collect();
         kept.sort_unstable();
         kept
     }

@@ -200,3 +200,44 @@ fn patterns(args: &Args, scans: &[Scan]) -> Vec<String> {
 fn escape(path: &str) -> String {
     glob::Pattern::escape(path)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(pattern: &str, usable: bool) -> Scan {
+        let facts = FileFacts {
+            points: 1,
+            rect_m: None,
+            density_per_m2: None,
+            crs: None,
+            notes: Vec::new(),
+        };
+        let facts = if usable { Ok(facts) } else { Err("no points".to_owned()) };
+        Scan { pattern: pattern.to_owned(), facts }
+    }
+
+    #[test]
+    fn tables_are_excluded_only_where_a_glob_names_them() {
+        let args = Args {
+            folder: PathBuf::new(),
+            scans: Vec::new(),
+            name: None,
+            platform: "tls".to_owned(),
+            force: false,
+        };
+        let table = || scan("trees.csv", false);
+        assert_eq!(excluded(&args, &[scan("a.xyz", true), table()]), "");
+        let listed = excluded(&args, &[scan("a.csv", true), table()]);
+        assert!(listed.contains("exclude = [\n    \"trees.csv\",\n]"), "{listed}");
+        assert!(excluded(&args, &[scan("a.xyz", true), scan("b.e57", false)]).contains("b.e57"));
+    }
+
+    #[test]
+    fn endings_of_all_formats_are_known() {
+        for name in ["a.LAS", "b.copc.laz", "c.e57", "d.ply", "e.pcd", "f.pts", "g.xyz", "h.TXT"] {
+            assert!(is_scan(Path::new(name)), "{name}");
+        }
+        assert!(!is_scan(Path::new("campaign.toml")) && !is_scan(Path::new("las")));
+    }
+}

@@ -13,11 +13,12 @@ use crate::assemble::{Assembler, Batch};
 use crate::contain::contained;
 use crate::crs::{UnitChoice, crs_of_wkt, with_units};
 use crate::damages::Damages;
+use crate::records::note_steps;
 use crate::scan::{ColumnScan, Rows};
 use crate::source::Source;
 use crate::{Error, Notes};
-use ::e57::E57Reader;
-use layout::file_roles;
+use ::e57::{E57Reader, PointCloud, Record, RecordDataType, RecordName};
+use layout::{Attribute, file_roles};
 use reader::{Found, read_all};
 use std::sync::mpsc::{Receiver, sync_channel};
 use timberline_artefact::Crs;
@@ -55,9 +56,10 @@ pub(crate) fn open(
     if scans.iter().all(|scan| scan.records == 0) {
         notes.say(format!("none of {} scans has points", scans.len()));
     }
+    scans.iter().for_each(|scan| note_coarse(scan, &mut notes));
     let roles = file_roles(&scans);
     let in_metres = with_units(Crs::default(), units);
-    let assembler = Assembler::new(roles.iter().map(|column| column.role()).collect(), &in_metres);
+    let assembler = Assembler::new(roles.iter().map(Attribute::role).collect(), &in_metres);
     let (send, receive) = sync_channel(WAITING);
     std::thread::Builder::new()
         .name("e57".to_owned())
@@ -65,6 +67,22 @@ pub(crate) fn open(
         .map_err(Error::io("scans (no thread)"))?;
     let rows = Box::new(ThreadRows { receive });
     Ok(ColumnScan { container: "E57", crs, notes, assembler, damages: Damages::default(), rows })
+}
+
+/// Says when 32-bit coordinates of a scan are too large to tell a millimetre.
+fn note_coarse(scan: &PointCloud, notes: &mut Notes) {
+    let is_single = |record: &Record| {
+        record.name == RecordName::CartesianX
+            && matches!(record.data_type, RecordDataType::Single { .. })
+    };
+    if let Some(b) = scan.cartesian_bounds.as_ref().filter(|_| scan.prototype.iter().any(is_single))
+    {
+        let bounds = [b.x_min, b.x_max, b.y_min, b.y_max, b.z_min, b.z_max];
+        note_steps(
+            bounds.into_iter().flatten().fold(0.0, |most, value| most.max(value.abs())),
+            notes,
+        );
+    }
 }
 
 fn refuse(problem: String) -> Error {

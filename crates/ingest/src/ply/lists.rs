@@ -28,7 +28,7 @@ pub(super) fn skip(source: &mut dyn Source, header: &Header, index: usize) -> Re
     for element in &header.elements[..index] {
         match element.record_len() {
             Some(len) => {
-                bytes.at = bytes.at.saturating_add(element.count.saturating_mul(len as u64))
+                bytes.at = bytes.at.saturating_add(element.count.saturating_mul(len as u64));
             }
             None => {
                 for _ in 0..element.count {

@@ -64,10 +64,10 @@ pub(crate) fn open(mut source: Box<dyn Source>, crs: Crs) -> Result<ColumnScan, 
 }
 
 /// The columns that are read: what each is, its type and its place in a record without lists.
-type Layout = Vec<(Role, Value)>;
+type Layout = [(Role, Value)];
 
 /// The element that holds the points, and its columns.
-fn find_points(header: &Header) -> Result<(usize, Layout), Error> {
+fn find_points(header: &Header) -> Result<(usize, Vec<(Role, Value)>), Error> {
     let vertex = header.elements.iter().position(|element| element.name == "vertex");
     let candidates = vertex.into_iter().chain(0..header.elements.len());
     let layouts = candidates.map(|index| (index, layout(&header.elements[index])));
@@ -88,7 +88,7 @@ fn find_points(header: &Header) -> Result<(usize, Layout), Error> {
     Err(Error::Content { place: "PLY header".to_owned(), problem, remedy })
 }
 
-fn layout(element: &Element) -> Layout {
+fn layout(element: &Element) -> Vec<(Role, Value)> {
     let mut at = 0;
     let mut scalars = Vec::new();
     for property in &element.properties {

@@ -60,22 +60,19 @@ las.x, las.y, las.z, las.intensity = x, y, z, intensity
 las.red, las.green, las.blue = red * 257, green * 257, blue * 257
 las.write(path("cloud.laz"))
 
-# Two scans in libE57: the first as it is, the second turned by a quarter and stepped away.
+# Two scans in libE57, each in its scanner's frame (pye57 writes 32-bit coordinates): world = R local + t,
+# R nothing for the first and a quarter turn to the left for the second.
 half = count // 2
 file = pye57.E57(path("cloud.e57"), mode="w")
-for part, turn in [(slice(0, half), None), (slice(half, count), 90.0)]:
+for part, is_turned in [(slice(0, half), False), (slice(half, count), True)]:
     data = {"intensity": intensity[part].astype(float)}
     for name, values in [("colorRed", red), ("colorGreen", green), ("colorBlue", blue)]:
         data[name] = values[part].astype(np.uint8)
-    if turn is None:
-        data["cartesianX"], data["cartesianY"], data["cartesianZ"] = x[part], y[part], z[part]
-        file.write_scan_raw(data)
-    else:
-        # In the scanner's frame: world = R local + t, R a quarter turn to the left.
-        t = np.array([500000.0, 5400000.0, 10.0])
-        dx, dy, dz = x[part] - t[0], y[part] - t[1], z[part] - t[2]
-        data["cartesianX"], data["cartesianY"], data["cartesianZ"] = dy, -dx, dz
-        q = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)]
-        file.write_scan_raw(data, rotation=np.array(q), translation=t)
+    t = np.array([500000.0, 5400000.0, 10.0])
+    dx, dy, dz = x[part] - t[0], y[part] - t[1], z[part] - t[2]
+    q = [np.sqrt(0.5), 0, 0, np.sqrt(0.5)] if is_turned else [1.0, 0, 0, 0]
+    local = (dy, -dx, dz) if is_turned else (dx, dy, dz)
+    data["cartesianX"], data["cartesianY"], data["cartesianZ"] = local
+    file.write_scan_raw(data, rotation=np.array(q), translation=t)
 file.close()
 print(f"{count} points written with pye57, plyfile, laspy and numpy")
