@@ -48,7 +48,8 @@ impl Cover {
 
     /// The ground that so many points cover; `None` without points.
     pub(crate) fn area_m2(mut self, points: u64) -> Option<f64> {
-        while self.cells.len() > 1 && (points as f64) < POINTS_PER_CELL * self.cells.len() as f64 {
+        // The four cells around 0 never become one.
+        while self.cells.len() > 4 && (points as f64) < POINTS_PER_CELL * self.cells.len() as f64 {
             self.coarsen();
         }
         (points > 0).then_some(self.cells.len() as f64 * self.cell_m * self.cell_m)
@@ -82,5 +83,13 @@ mod tests {
         cover.add(&x, &x);
         assert!(cover.cells.len() <= MAX_CELLS);
         assert_eq!(Cover::default().area_m2(0), None);
+    }
+
+    /// Found by fuzzing: merging went on for ever.
+    #[test]
+    fn few_points_on_both_sides_of_zero() {
+        let mut cover = Cover::default();
+        cover.add(&[1.5, -4.0], &[2.0, 500.0]);
+        assert_eq!(cover.area_m2(2), Some(0.5));
     }
 }
