@@ -217,6 +217,7 @@ fn thinning_and_marks_do_not_depend_on_the_tiles() {
     let params = TilesParams {
         thin_m: 0.03,
         outlier_factor: 3.0,
+        outlier_reach_m: 0.25,
         isolated_points: 2,
         ..TilesParams::default()
     };
