@@ -1,10 +1,10 @@
-//! Looking at LAS, LAZ and COPC files for the engine.
+//! Looking at point clouds for the engine.
 
 use crate::engine::survey::{FileFacts, Surveyor};
 use std::path::Path;
 use timberline_ingest::{UnitChoice, survey};
 
-/// The surveyor for point files of surveys.
+/// The surveyor for point clouds of all formats.
 #[derive(Debug, Clone, Copy, Default)]
 pub struct LasSurveyor;
 
@@ -25,8 +25,7 @@ impl Surveyor for LasSurveyor {
 
     fn tile_edge_m(&self, files: &[FileFacts], points: u32) -> u32 {
         let facts = |file: &FileFacts| survey::FileFacts {
-            version: (0, 0),
-            format: 0,
+            las: None,
             container: "",
             points: file.points,
             crs: file.crs.clone().unwrap_or_default(),

@@ -72,6 +72,26 @@ pub fn crs_of(
     Ok(build(said, text, units, notes))
 }
 
+/// The system that a text names, for formats that have nothing else; unknown for other texts.
+///
+/// # Errors
+/// [`Error::NotProjected`] for longitude and latitude; [`Error::Unit`] for unknown units.
+pub(crate) fn crs_of_wkt(text: &str, units: UnitChoice, notes: &mut Notes) -> Result<Crs, Error> {
+    let text = text.trim();
+    let Some(node) = Node::parse(text) else {
+        if !text.is_empty() {
+            let start: String = text.chars().take(40).collect();
+            notes.say(format!("the coordinate system cannot be understood (`{start}`)"));
+        }
+        return Ok(with_units(Crs::default(), units));
+    };
+    let said = said_by_wkt(&node, units)?;
+    match said.not_projected {
+        Some(what) => Err(Error::NotProjected { name: said.name, what }),
+        None => Ok(build(said, Some(text.to_owned()), units, notes)),
+    }
+}
+
 fn wkt_text(records: &Records) -> Option<String> {
     let data = records.wkt.as_ref()?;
     let text = String::from_utf8_lossy(&data.bytes);
@@ -104,7 +124,7 @@ fn build(said: Said, wkt: Option<String>, units: UnitChoice, notes: &mut Notes) 
     with_units(crs, units)
 }
 
-fn with_units(mut crs: Crs, units: UnitChoice) -> Crs {
+pub(crate) fn with_units(mut crs: Crs, units: UnitChoice) -> Crs {
     if let Some(metres) = units.horizontal.metres() {
         crs.horizontal_m_per_unit = metres;
     }

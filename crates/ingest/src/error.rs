@@ -26,12 +26,22 @@ pub enum Error {
     },
     /// Some other kind of file, told by its contents.
     #[error(
-        "this is {found}, not a LAS, LAZ or COPC file; convert it to LAS or LAZ (1.0 to 1.4), \
-         or leave it out of the campaign's inputs"
+        "this is {found}, not a point cloud as LAS, LAZ, COPC, E57, PLY, PCD or text; convert it to \
+         one of them, or leave it out of the campaign's inputs"
     )]
     Foreign {
         /// What the contents look like.
         found: String,
+    },
+    /// Something that cannot be right in a file of another format than LAS.
+    #[error("{place}: {problem}; {remedy}")]
+    Content {
+        /// Where: a line, record or byte.
+        place: String,
+        /// What was found and what was expected.
+        problem: String,
+        /// What to do.
+        remedy: &'static str,
     },
     /// A field of the public header block that cannot be right.
     #[error("header field `{field}` (byte {offset}) is {value}, expected {expected}; {remedy}")]
@@ -86,6 +96,17 @@ pub enum Error {
         points: u64,
         /// Smallest coordinates stated, in the units of the file.
         bounds: [f64; 3],
+    },
+    /// No point has coordinates that can be used (formats other than LAS).
+    #[error(
+        "none of {points} points has coordinates that can be used ({first}; the limit is 67,108 km, \
+         in elevation 200 km); check which columns are x, y and z, and their unit"
+    )]
+    NoPlace {
+        /// Number of points.
+        points: u64,
+        /// The first of them with its value.
+        first: String,
     },
     /// Longitude and latitude.
     #[error(

@@ -49,7 +49,7 @@ impl Stored {
         all.get(usize::from(code).checked_sub(1)?).copied()
     }
 
-    fn len(self) -> usize {
+    pub(crate) fn len(self) -> usize {
         match self {
             Self::U8 | Self::I8 => 1,
             Self::U16 | Self::I16 => 2,

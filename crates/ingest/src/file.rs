@@ -5,16 +5,18 @@ use crate::decode::Decoder;
 use crate::extra::{self, ExtraField};
 use crate::header::Header;
 use crate::points::{Damage, PointReader};
+use crate::scan::Scan;
 use crate::source::Source;
 use crate::vlr::Records;
 use crate::{Error, Notes};
 use std::fs::File;
 use std::path::Path;
 use timberline_artefact::Crs;
-use timberline_pointcloud::PointCloud;
+use timberline_pointcloud::{Bounds3, PointCloud};
 
 /// An open file. Points come in batches of about half a million, whatever the file's size.
 pub struct LasFile {
+    container: &'static str,
     header: Header,
     crs: Crs,
     extra: Vec<ExtraField>,
@@ -58,6 +60,7 @@ impl LasFile {
         let reader = PointReader::new(source, &header, &records, &mut notes)?;
         let decoder = Decoder::new(&header, &crs, extra.clone());
         Ok(Self {
+            container: container(&header, &records),
             header,
             crs,
             extra,
@@ -133,6 +136,67 @@ impl LasFile {
             readable: self.read,
             expected: self.header.points,
         })
+    }
+}
+
+impl Scan for LasFile {
+    fn container(&self) -> &'static str {
+        self.container
+    }
+
+    fn crs(&self) -> &Crs {
+        &self.crs
+    }
+
+    fn extra(&self) -> &[ExtraField] {
+        &self.extra
+    }
+
+    fn notes(&self) -> &Notes {
+        &self.notes
+    }
+
+    fn stated_bounds_m(&self) -> Option<Bounds3> {
+        self.header.stated_bounds_m(&self.crs)
+    }
+
+    fn finest_step_m(&self) -> Option<f64> {
+        let Crs { horizontal_m_per_unit: h, vertical_m_per_unit: v, .. } = self.crs;
+        let scale = self.header.scale;
+        Some((scale[0] * h).min(scale[1] * h).min(scale[2] * v))
+    }
+
+    fn has_returns(&self) -> bool {
+        true
+    }
+
+    fn next_batch(&mut self) -> Result<Option<PointCloud>, Error> {
+        Self::next_batch(self)
+    }
+
+    fn outside(&self) -> u64 {
+        self.outside
+    }
+
+    fn nowhere(&self, points: u64) -> Error {
+        Error::Nowhere { points, bounds: self.header.bounds[0] }
+    }
+
+    fn damages(&self) -> &[Damage] {
+        self.reader.damages()
+    }
+
+    fn damage(&self) -> Option<Error> {
+        Self::damage(self)
+    }
+}
+
+/// `LAS`, `LAZ` or `COPC`.
+pub(crate) fn container(header: &Header, records: &Records) -> &'static str {
+    match (header.compressed, records.copc) {
+        (true, true) => "COPC",
+        (true, false) => "LAZ",
+        (false, _) => "LAS",
     }
 }
 

@@ -1,9 +1,12 @@
 //! The points of one tile from the shards of several files.
 
+use crate::marking::{mark, ring};
+use crate::outliers::Outliers;
 use crate::params::TilesParams;
 use crate::rules::{self, Dropped};
 use crate::segment;
 use crate::shard::{Section, Sections, ShardReader};
+use crate::thin::Voxels;
 use crate::voxels::{self, Isolation, voxel_of};
 use crate::{Error, Notes};
 use std::collections::BTreeMap;
@@ -21,16 +24,19 @@ pub struct Gathered {
     pub dropped: Dropped,
     /// Points of the tile in the shards.
     pub given: u64,
+    /// Points marked as outliers, by class 7.
+    pub marked: u64,
     /// The CRS of the files.
     pub crs: Crs,
     /// What a reader should know.
     pub notes: Vec<String>,
 }
 
-/// Reads a tile's points from shards, applies the rules, sorts, and drops what is there twice.
+/// Reads a tile's points from shards, applies the rules, sorts, drops what is there twice, thins and
+/// marks outliers.
 ///
-/// The shards should be those of all files with points within [`ISOLATION_REACH_M`] of the tile;
-/// their sequence does not matter.
+/// The shards should be those of all files with points within [`halo_m`] of the tile; their sequence
+/// does not matter.
 ///
 /// # Errors
 /// [`Error::Shard`] when a shard is not what was written, [`Error::Params`] when shards of
@@ -44,6 +50,12 @@ pub fn gather<S: Sections>(
     let mut notes = Notes::default();
     check_same(grid, shards)?;
     let crs = common_crs(shards, tile, &mut notes);
+    let outliers = Outliers::new(params);
+    let reach_m = outliers.map_or(0.0, |outliers| outliers.halo_m());
+    let isolation = (params.isolated_points > 0)
+        .then(|| neighbourhood(tile, grid, reach_m, shards))
+        .transpose()?
+        .map(|counts| Isolation::new(counts, params.isolated_points));
     let [x, y] = grid.corner_m(tile);
     let mut cloud = PointCloud::new(Frame::new([x, y, 0]));
     let mut dropped = Dropped::default();
@@ -56,15 +68,41 @@ pub fn gather<S: Sections>(
         }
     }
     add_columns(&mut cloud, shards, tile);
-    if params.isolated_points > 0 && !cloud.is_empty() {
-        let counts = neighbourhood(tile, grid, shards)?;
-        let isolation = Isolation::new(counts, params.isolated_points);
-        cloud = drop_isolated(cloud, &isolation, &mut dropped);
+    let mut cloud = select(cloud, isolation.as_ref(), params, &mut dropped);
+    let mut marked = 0;
+    if let Some(outliers) = outliers.filter(|_| !cloud.is_empty()) {
+        let around = ring(tile, grid, reach_m, shards, isolation.as_ref(), params)?;
+        marked = mark(&mut cloud, &around, &outliers, &grid.rect(tile))?;
     }
-    let cloud = drop_duplicates(&cloud.in_canonical_order(), &mut dropped);
     let lowest = cloud.z.iter().copied().fold(f64::INFINITY, f64::min);
     let cloud = cloud.in_frame(PointTile::frame(&grid, tile, lowest));
-    Ok(Gathered { cloud, dropped, given, crs, notes: notes.into_messages() })
+    Ok(Gathered { cloud, dropped, given, marked, crs, notes: notes.into_messages() })
+}
+
+/// How far around a tile points matter for it, metres.
+#[must_use]
+pub fn halo_m(params: &TilesParams) -> f64 {
+    let isolation_m = if params.isolated_points == 0 { 0.0 } else { ISOLATION_REACH_M };
+    isolation_m + Outliers::new(params).map_or(0.0, |outliers| outliers.halo_m())
+}
+
+/// Drops isolated points and duplicates, and thins; what is left in canonical order. Each of these
+/// decides by what lies in one place or voxel, never in two tiles.
+pub(crate) fn select(
+    cloud: PointCloud,
+    isolation: Option<&Isolation>,
+    params: &TilesParams,
+    dropped: &mut Dropped,
+) -> PointCloud {
+    let cloud = match isolation {
+        Some(isolation) if !cloud.is_empty() => drop_isolated(cloud, isolation, dropped),
+        _ => cloud,
+    };
+    let cloud = drop_duplicates(&cloud.in_canonical_order(), dropped);
+    let Some(voxels) = Voxels::new(params.thin_m) else { return cloud };
+    let kept = voxels.keep(&cloud);
+    dropped.thinned += (cloud.len() - kept.len()) as u64;
+    cloud.select(&kept)
 }
 
 /// How far around a tile points can decide whether one of the tile's is isolated, metres.
@@ -109,7 +147,7 @@ fn common_crs<S: Sections>(shards: &[ShardReader<S>], tile: TileId, notes: &mut 
     })
 }
 
-fn read_section<S: Sections>(
+pub(crate) fn read_section<S: Sections>(
     shard: &mut ShardReader<S>,
     section: &Section,
     frame: Frame,
@@ -124,7 +162,11 @@ fn read_section<S: Sections>(
 }
 
 /// Appends points; columns whose types differ between files become `f64`.
-fn append(cloud: &mut PointCloud, mut part: PointCloud, notes: &mut Notes) -> Result<(), Error> {
+pub(crate) fn append(
+    cloud: &mut PointCloud,
+    mut part: PointCloud,
+    notes: &mut Notes,
+) -> Result<(), Error> {
     for (name, theirs) in &mut part.extra {
         let Some(ours) = cloud.extra.get_mut(name) else { continue };
         if ours.type_name() == theirs.type_name() {
@@ -158,14 +200,16 @@ fn add_columns<S: Sections>(cloud: &mut PointCloud, shards: &[ShardReader<S>], t
     }
 }
 
-/// Voxel counts of a tile and its surroundings, over all shards.
+/// Voxel counts of what decides about points up to `around_m` from a tile, over all shards.
 fn neighbourhood<S: Sections>(
     tile: TileId,
     grid: TileGrid,
+    around_m: f64,
     shards: &mut [ShardReader<S>],
 ) -> Result<Vec<(voxels::Voxel, u32)>, Error> {
-    let near = grid.neighbours(tile, ISOLATION_REACH_M);
-    let own = grid.rect(tile).grown(ISOLATION_REACH_M);
+    let reach_m = ISOLATION_REACH_M + around_m;
+    let near = grid.neighbours(tile, reach_m);
+    let own = grid.rect(tile).grown(reach_m);
     let [low, high] = [own.min, own.max].map(|corner| voxel_of([corner[0], corner[1], 0.0]));
     let within =
         |v: &voxels::Voxel| (0..2).all(|axis| v[axis] >= low[axis] && v[axis] <= high[axis]);

@@ -1,11 +1,12 @@
-//! Reads LAS, LAZ and COPC files into tiles on a world-aligned grid.
+//! Reads LAS, LAZ, COPC, E57, PLY, PCD and text files into tiles on a world-aligned grid.
 //!
 //! Nothing a file says is believed before it has been checked: a damaged, hostile or foreign file
 //! ends in an [`Error`] that names the place and a remedy, never in a panic, an endless loop or an
 //! allocation that the file's size does not justify. Memory does not grow with the size of a file.
 //!
-//! * [`LasFile`] reads LAS 1.0 to 1.4, point formats 0 to 10, LAZ and COPC as batches of points in
-//!   metres; [`survey`] reads headers only and proposes a tile edge.
+//! * [`scan::open`] tells the format of a file by its contents and gives batches of points in metres
+//!   ([`Scan`]): LAS 1.0 to 1.4 with point formats 0 to 10, LAZ and COPC ([`LasFile`]); E57; PLY;
+//!   PCD; text (XYZ, TXT, ASC, PTS, CSV). [`survey`] tells what files are and proposes a tile edge.
 //! * [`scatter`](scatter::scatter) buckets a file's points by tile in one pass,
 //!   [`gather`](gather::gather) puts a tile together from the buckets of all files, leaves points out
 //!   by rule and counts them.
@@ -23,6 +24,7 @@ pub mod notes;
 pub mod params;
 pub mod points;
 pub mod rules;
+pub mod scan;
 pub mod scatter;
 pub mod shard;
 pub mod source;
@@ -30,15 +32,30 @@ pub mod stage;
 pub mod survey;
 pub mod vlr;
 
+mod assemble;
+mod attributes;
+mod blocks;
 mod contain;
+mod counted;
+mod cover;
+mod damages;
 mod decode;
+mod e57;
 mod geokeys;
 mod laszip;
+mod marking;
 mod observe;
+mod outliers;
+mod pcd;
+mod ply;
+mod records;
 mod segment;
 mod sniff;
+mod table;
 #[cfg(test)]
 mod testing;
+mod text;
+mod thin;
 mod voxels;
 mod wkt;
 
@@ -49,3 +66,4 @@ pub use header::Header;
 pub use notes::Notes;
 pub use params::{Damaged, LengthUnit, Overlap, ScatterParams, TilesParams};
 pub use points::Damage;
+pub use scan::Scan;

@@ -146,9 +146,11 @@ impl Observed {
         self.share_at_zero().is_some_and(|share| share >= NORMALISED_SHARE)
     }
 
-    /// Says what a user should know.
-    pub(crate) fn report(&self, notes: &mut Notes) {
-        if self.points > 0 && self.zero_returns == self.points {
+    /// Says what a user should know; `has_returns` when the file should know return numbers.
+    pub(crate) fn report(&self, has_returns: bool, notes: &mut Notes) {
+        if !has_returns {
+            // A format without them is not to be blamed.
+        } else if self.points > 0 && self.zero_returns == self.points {
             notes.say(
                 "the return number is 0 everywhere: every point is taken as the only return of \
                  its pulse",
@@ -208,7 +210,7 @@ mod tests {
     #[test]
     fn returns_of_zero_are_said() {
         let mut notes = Notes::default();
-        observed(|_, _| 312.0).report(&mut notes);
+        observed(|_, _| 312.0).report(true, &mut notes);
         assert_eq!(notes.messages().len(), 1);
         assert!(notes.messages()[0].contains("0 everywhere"));
     }
@@ -240,7 +242,7 @@ mod tests {
         cloud.push_world([11.0, 5.0, 5.0], &Point { return_number: 1, ..Point::default() });
         observed.add(&cloud);
         let mut notes = Notes::default();
-        observed.report(&mut notes);
+        observed.report(true, &mut notes);
         assert!(notes.messages()[0].starts_with("1 of 2 points lie outside"), "{notes:?}");
     }
 }

@@ -6,7 +6,8 @@ use timberline_pointcloud::PointCloud;
 
 const WITHHELD: u8 = 1 << 2;
 const OVERLAP: u8 = 1 << 3;
-const LOW_NOISE: u8 = 7;
+/// Low points, and noise of any kind (ASPRS LAS 1.4-R15, table 17; PDAL marks outliers so).
+pub(crate) const LOW_NOISE: u8 = 7;
 const HIGH_NOISE: u8 = 18;
 /// Overlap in formats 0 to 5, which have no flag for it.
 const CLASS_OVERLAP: u8 = 12;
@@ -24,13 +25,15 @@ pub struct Dropped {
     pub isolated: u64,
     /// Present more than once.
     pub duplicate: u64,
+    /// In a voxel with a point nearer to the centroid.
+    pub thinned: u64,
 }
 
 impl Dropped {
     /// All of them.
     #[must_use]
     pub fn total(&self) -> u64 {
-        self.withheld + self.noise + self.overlap + self.isolated + self.duplicate
+        self.withheld + self.noise + self.overlap + self.isolated + self.duplicate + self.thinned
     }
 }
 
@@ -39,7 +42,7 @@ pub(crate) fn is_company(classification: u8, flags: u8) -> bool {
     flags & WITHHELD == 0 && !is_noise(classification)
 }
 
-fn is_noise(classification: u8) -> bool {
+pub(crate) fn is_noise(classification: u8) -> bool {
     matches!(classification, LOW_NOISE | HIGH_NOISE)
 }
 

@@ -1,8 +1,9 @@
 //! One pass over a file: its points bucketed by tile, in bounded memory.
 
-use crate::file::LasFile;
+use crate::extra::ExtraField;
 use crate::observe::Observed;
 use crate::params::{Damaged, ScatterParams};
+use crate::scan::Scan;
 use crate::segment;
 use crate::shard::{Section, ShardIndex, ShardWriter};
 use crate::voxels;
@@ -47,14 +48,15 @@ pub struct Scattered {
 /// [`Error::Damaged`] unless damaged files are to be kept, [`Error::Io`] of file or `out`, and what
 /// `progress` returns.
 pub fn scatter<W: Write>(
-    mut file: LasFile,
+    file: impl Into<Box<dyn Scan>>,
     grid: TileGrid,
     params: &ScatterParams,
     out: W,
     mut progress: impl FnMut(u64) -> Result<(), Error>,
 ) -> Result<(W, Scattered), Error> {
+    let mut file = file.into();
     let mut buckets = Buckets::new(grid, out);
-    let mut observed = Observed::new(file.header().stated_bounds_m(file.crs()));
+    let mut observed = Observed::new(file.stated_bounds_m());
     let mut outside = 0;
     while let Some(batch) = file.next_batch()? {
         progress(batch.len() as u64)?;
@@ -66,8 +68,8 @@ pub fn scatter<W: Write>(
         observed.add(&batch);
         buckets.add(&batch)?;
     }
-    let notes = judge(&file, &observed, outside + file.outside(), params.damaged)?;
-    let (out, index) = buckets.finish(&file, &observed)?;
+    let notes = judge(file.as_ref(), &observed, outside + file.outside(), params.damaged)?;
+    let (out, index) = buckets.finish(file.crs(), file.extra(), &observed)?;
     let scattered = Scattered {
         index,
         outside: outside + file.outside(),
@@ -82,7 +84,7 @@ pub fn scatter<W: Write>(
 
 /// Decides whether what was read will do, and collects what to say about it.
 fn judge(
-    file: &LasFile,
+    file: &dyn Scan,
     observed: &Observed,
     outside: u64,
     damaged: Damaged,
@@ -90,19 +92,21 @@ fn judge(
     let mut notes = file.notes().clone();
     check_damage(file, damaged, &mut notes)?;
     if outside > 0 && observed.points == 0 {
-        return Err(Error::Nowhere { points: outside, bounds: file.header().bounds[0] });
+        return Err(file.nowhere(outside));
     }
     if outside > 0 {
+        let first = file.first_outside().map(|first| format!(" (the first: {first})"));
         notes.say(format!(
-            "{outside} points lie outside of what coordinates can be and are left out"
+            "{outside} points lie outside of what coordinates can be and are left out{}",
+            first.unwrap_or_default()
         ));
     }
     note_scale(file, &mut notes);
-    observed.report(&mut notes);
+    observed.report(file.has_returns(), &mut notes);
     Ok(notes)
 }
 
-fn check_damage(file: &LasFile, damaged: Damaged, notes: &mut Notes) -> Result<(), Error> {
+fn check_damage(file: &dyn Scan, damaged: Damaged, notes: &mut Notes) -> Result<(), Error> {
     let Some(error) = file.damage() else { return Ok(()) };
     if damaged == Damaged::Refuse {
         return Err(error);
@@ -114,10 +118,8 @@ fn check_damage(file: &LasFile, damaged: Damaged, notes: &mut Notes) -> Result<(
 }
 
 /// Says when positions are rounded to the lattice.
-fn note_scale(file: &LasFile, notes: &mut Notes) {
-    let Crs { horizontal_m_per_unit: h, vertical_m_per_unit: v, .. } = *file.crs();
-    let scale = file.header().scale;
-    let finest = (scale[0] * h).min(scale[1] * h).min(scale[2] * v);
+fn note_scale(file: &dyn Scan, notes: &mut Notes) {
+    let Some(finest) = file.finest_step_m() else { return };
     // Half a tick of slack: scales are written with errors of their own.
     if finest < 0.95 * timberline_pointcloud::frame::TICK_M {
         notes.say(format!(
@@ -245,17 +247,22 @@ impl<W: Write> Buckets<W> {
         Ok(())
     }
 
-    fn finish(mut self, file: &LasFile, observed: &Observed) -> Result<(W, ShardIndex), Error> {
+    fn finish(
+        mut self,
+        crs: &Crs,
+        extra: &[ExtraField],
+        observed: &Observed,
+    ) -> Result<(W, ShardIndex), Error> {
         let tiles: Vec<TileId> = self.waiting.keys().copied().collect();
         tiles.into_iter().try_for_each(|tile| self.flush(tile))?;
         let columns = self.columns.iter().filter(|(_, kept)| **kept);
         let index = ShardIndex {
             grid: self.grid,
-            crs: file.crs().clone(),
+            crs: crs.clone(),
             points: observed.points,
             bounds: (!observed.bounds.is_empty()).then_some(observed.bounds),
             columns: columns.map(|(name, _)| name.clone()).collect(),
-            extra: file.extra().to_vec(),
+            extra: extra.to_vec(),
             sections: self.sections,
         };
         let out = self.writer.finish(&index).map_err(|error| Error::Shard {

@@ -1,9 +1,9 @@
 //! The stages `scatter` and `tiles`.
 
-use crate::gather::{Gathered, ISOLATION_REACH_M, gather};
+use crate::gather::{self, Gathered, gather};
 use crate::scatter::{Scattered, scatter};
 use crate::shard::ShardReader;
-use crate::{Error, LasFile, ScatterParams, TilesParams};
+use crate::{Error, ScatterParams, TilesParams, scan};
 use timberline_artefact::container::ContainerReader;
 use timberline_artefact::kinds::{PointTile, Shards};
 use timberline_artefact::stage::{Context, InputSpec, Inputs, Stage, StageError, StageInfo};
@@ -21,7 +21,7 @@ impl Stage for Scatter {
         StageInfo {
             name: "scatter",
             version: 1,
-            summary: "reads a LAS, LAZ or COPC file and buckets its points by tile",
+            summary: "reads a point cloud of any known format and buckets its points by tile",
             unit: UnitKind::File,
             inputs: &[],
             outputs: &[Shards::NAME],
@@ -43,7 +43,7 @@ impl Stage for Scatter {
         let raw = inputs.raw()?;
         let grid = grid_of(context)?;
         let crs = context.campaign().crs.as_ref();
-        let file = LasFile::open(&raw.path, params.units(), crs)?;
+        let file = scan::open(&raw.path, params.units(), crs)?;
         context.emit_stream::<Shards>(|out| {
             let mut stopped = Ok(());
             let progress = |points: u64| {
@@ -101,16 +101,16 @@ impl Stage for Tiles {
         StageInfo {
             name: "tiles",
             version: 1,
-            summary: "puts a tile together: drops noise, withheld, isolated and duplicate points",
+            summary: "puts a tile together: drops noise, withheld, isolated and duplicate points, thins, marks outliers",
             unit: UnitKind::Tile,
             inputs: &INPUTS,
             outputs: &[PointTile::NAME],
         }
     }
 
-    /// Points of neighbouring tiles decide whether a point at the border is isolated.
+    /// Points of neighbouring tiles decide whether a point at the border is isolated or an outlier.
     fn halo_m(params: &TilesParams) -> f64 {
-        if params.isolated_points == 0 { 0.0 } else { ISOLATION_REACH_M }
+        gather::halo_m(params)
     }
 
     fn run(params: &TilesParams, inputs: &Inputs, context: &Context<'_>) -> Result<(), StageError> {
@@ -143,6 +143,9 @@ fn tile_facts(gathered: &Gathered, grid: TileGrid) -> Facts {
         ("dropped_isolated", dropped.isolated),
         ("dropped_duplicate", dropped.duplicate),
     ];
+    // Only where they were asked for.
+    let asked = [("dropped_thinned", dropped.thinned), ("marked_outlier", gathered.marked)];
+    let counts = counts.into_iter().chain(asked.into_iter().filter(|(_, count)| *count > 0));
     let local = gathered.cloud.bounds();
     let world = |corner: [f64; 3]| gathered.cloud.frame.world_from_local(corner);
     Facts {
@@ -155,5 +158,7 @@ fn tile_facts(gathered: &Gathered, grid: TileGrid) -> Facts {
         grid: Some(grid),
         counts: counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
         ..Facts::default()
+        counts: counts.map(|(name, count)| (name.to_owned(), count)).collect(),
+        parts: Vec::new(),
     }
 }

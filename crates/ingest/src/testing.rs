@@ -179,3 +179,19 @@ fn points_at_items(bytes: &[u8]) -> usize {
     let user = bytes.windows(16).position(|window| window == name).unwrap();
     user - 2 + 54 + 32
 }
+
+/// Makes the checksums of an E57 file's pages right again: CRC-32C of the first 1020 of 1024 bytes,
+/// most significant byte first.
+pub(crate) fn seal_e57(bytes: &mut [u8]) {
+    const POLYNOMIAL: u32 = 0x82F6_3B78;
+    for page in bytes.chunks_exact_mut(1024) {
+        let mut crc = u32::MAX;
+        for byte in &page[..1020] {
+            crc ^= u32::from(*byte);
+            for _ in 0..8 {
+                crc = (crc >> 1) ^ (POLYNOMIAL & (crc & 1).wrapping_neg());
+            }
+        }
+        page[1020..].copy_from_slice(&(!crc).to_be_bytes());
+    }
+}

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::sync::mpsc;
 use std::time::{Duration, Instant};
 use timberline_ingest::scatter::scatter;
-use timberline_ingest::{Damaged, LasFile, ScatterParams, UnitChoice};
+use timberline_ingest::{Damaged, ScatterParams, UnitChoice, scan};
 use timberline_pointcloud::TileGrid;
 
 const LIMIT: Duration = Duration::from_secs(10);
@@ -36,22 +36,19 @@ fn read(path: &Path, damaged: Damaged) -> Outcome {
         Outcome { text: format!("refused: {text}"), facts: String::new(), is_refused: true }
     };
     let grid = TileGrid::new(128, [0, 0]).unwrap();
-    let file = match LasFile::open(path, UnitChoice::default(), None) {
+    let file = match scan::open(path, UnitChoice::default(), None) {
         Ok(file) => file,
         Err(error) => return refused(error),
     };
-    let (header, crs) = (file.header().clone(), file.crs().clone());
+    let (container, crs) = (file.container(), file.crs().clone());
     let columns: Vec<String> = file.extra().iter().map(|field| field.name.clone()).collect();
     let facts = sums(path);
     match scatter(file, grid, &params, std::io::sink(), |_| Ok(())) {
         Err(error) => refused(error),
         Ok((_, scattered)) => {
             let mut text = format!(
-                "{} points, LAS {}.{} format {}, {} tiles, {}",
+                "{} points, {container}, {} tiles, {}",
                 scattered.index.points,
-                header.version.0,
-                header.version.1,
-                header.layout.format,
                 scattered.index.tiles().len(),
                 crs.name
             );
@@ -71,7 +68,7 @@ fn read(path: &Path, damaged: Damaged) -> Outcome {
 
 /// Number, bounds and sums of what is read, in the units of the file.
 fn sums(path: &Path) -> String {
-    let mut file = LasFile::open(path, UnitChoice::default(), None).unwrap();
+    let mut file = scan::open(path, UnitChoice::default(), None).unwrap();
     let crs = file.crs().clone();
     let (mut count, mut sum) = (0u64, [0.0; 3]);
     let mut bytes = [0u64; 6];
@@ -87,7 +84,7 @@ fn sums(path: &Path) -> String {
             bytes[2] += u64::from(point.number_of_returns);
             bytes[3] += u64::from(point.classification);
             bytes[4] += u64::from(point.source_id);
-            bytes[5] += cloud.extra["user_data"].value(index) as u64;
+            bytes[5] += cloud.extra.get("user_data").map_or(0, |user| user.value(index) as u64);
             gps += if point.gps_time.is_finite() { point.gps_time } else { 0.0 };
         }
     }

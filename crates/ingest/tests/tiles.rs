@@ -6,7 +6,7 @@ use std::io::Cursor;
 use timberline_ingest::gather::{Gathered, gather};
 use timberline_ingest::scatter::{Scattered, scatter};
 use timberline_ingest::shard::ShardReader;
-use timberline_ingest::{LasFile, ScatterParams, TilesParams, UnitChoice};
+use timberline_ingest::{LasFile, ScatterParams, TilesParams, UnitChoice, scan};
 use timberline_pointcloud::frame::ticks_from_world;
 use timberline_pointcloud::{TileGrid, TileId};
 
@@ -184,4 +184,80 @@ fn a_damaged_shard_is_named() {
     let moved = TileGrid::new(64, [1, 0]).unwrap();
     let error = gather(tile, moved, &mut other, &TilesParams::default()).unwrap_err().to_string();
     assert!(error.contains("run the stage `scatter` again"), "{error}");
+}
+
+/// A terrestrial plot as text: a thinning wall of points over three tiles, with points in the air.
+fn plot() -> Vec<u8> {
+    let mut text = String::from("x y z intensity\n");
+    for i in 0..30_000u32 {
+        let noise =
+            |salt: u32| f64::from((i ^ salt).wrapping_mul(2_654_435_761) >> 12) / 1_048_576.0;
+        let x = 62.0 + 4.0 * noise(1) * noise(2);
+        let y = if i % 600 == 0 { 499.0 + 3.0 * noise(5) } else { 500.0 + 0.002 * noise(3) };
+        text.push_str(&format!("{x:.4} {y:.4} {:.4} {}\n", 2.0 * noise(4), i % 500));
+    }
+    text.into_bytes()
+}
+
+fn plot_tiles(grid: TileGrid, params: &TilesParams) -> BTreeMap<TileId, Gathered> {
+    let source = Box::new(Cursor::new(plot()));
+    let file = scan::from_source(source, UnitChoice::default(), None).unwrap();
+    let (bytes, scattered) =
+        scatter(file, grid, &ScatterParams::default(), Vec::new(), |_| Ok(())).unwrap();
+    let gathered = |tile: TileId| {
+        let mut readers = [ShardReader::new(bytes.as_slice()).unwrap()];
+        (tile, gather(tile, grid, &mut readers, params).unwrap())
+    };
+    scattered.index.tiles().into_iter().map(gathered).collect()
+}
+
+/// Thinning and marking look beyond the tile, and find the same whatever it is.
+#[test]
+fn thinning_and_marks_do_not_depend_on_the_tiles() {
+    let params = TilesParams {
+        thin_m: 0.03,
+        outlier_factor: 3.0,
+        outlier_reach_m: 0.25,
+        isolated_points: 2,
+        ..TilesParams::default()
+    };
+    let whole = plot_tiles(grid(1000, 0), &params);
+    let expected = all_points(&whole);
+    let marked: u64 = whole.values().map(|tile| tile.marked).sum();
+    let thinned: u64 = whole.values().map(|tile| tile.dropped.thinned).sum();
+    assert!((10..60).contains(&marked), "{marked}");
+    assert!(thinned > 15_000 && thinned + expected.len() as u64 == 30_000, "{thinned}");
+    assert_eq!(expected.iter().filter(|point| point.2 == 7).count() as u64, marked);
+    for (edge, origin) in [(1, 0), (2, 1), (4, 0), (64, 0)] {
+        let tiles = plot_tiles(grid(edge, origin), &params);
+        assert!(tiles.len() > 1);
+        assert!(all_points(&tiles) == expected, "edge {edge} origin {origin}");
+        assert_eq!(tiles.values().map(|tile| tile.marked).sum::<u64>(), marked);
+    }
+    let off = plot_tiles(grid(64, 0), &TilesParams::default());
+    assert_eq!(all_points(&off).len(), 30_000);
+    assert!(off.values().all(|tile| tile.marked == 0 && tile.dropped.thinned == 0));
+}
+
+/// A campaign may hold files of several formats.
+#[test]
+fn formats_mix() {
+    let las = file(&stand(60, 5), 6);
+    let text: String = stand(60, 5)
+        .iter()
+        .map(|p| format!("{},{},{},{}\n", p.x, p.y, p.z + 0.5, p.return_number))
+        .collect();
+    let grid = grid(1000, 0);
+    let source = Box::new(Cursor::new(text.into_bytes()));
+    let scan = scan::from_source(source, UnitChoice::default(), None).unwrap();
+    let other = scatter(scan, grid, &ScatterParams::default(), Vec::new(), |_| Ok(())).unwrap().0;
+    let (las, scattered) = scattered(&las, grid);
+    let tile = scattered.index.tiles()[0];
+    let mut readers = [las, other].map(|bytes| {
+        let bytes: &'static [u8] = Box::leak(bytes.into_boxed_slice());
+        ShardReader::new(bytes).unwrap()
+    });
+    let found = gather(tile, grid, &mut readers, &TilesParams::default()).unwrap();
+    assert_eq!(found.cloud.len(), 2 * 5 * 2 * 80);
+    assert_eq!(found.cloud.gps_time.iter().filter(|time| time.is_nan()).count(), 5 * 2 * 80);
 }

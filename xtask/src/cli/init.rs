@@ -31,6 +31,10 @@ pub struct Args {
     force: bool,
 }
 
+/// Endings of point clouds. Files of the last three are often something else.
+const ENDINGS: [&str; 10] = ["las", "laz", "e57", "ply", "pcd", "pts", "xyz", "txt", "asc", "csv"];
+const OFTEN_OTHER: [&str; 3] = ["txt", "asc", "csv"];
+
 struct Scan {
     /// As it stands in the campaign file.
     pattern: String,
@@ -52,7 +56,9 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
     if scans.iter().all(|scan| scan.facts.is_err()) {
         report(&scans);
         let place = args.folder.display();
-        return Err(Usage(format!("no usable .las, .laz or .copc.laz file in {place}")).into());
+        return Err(
+            Usage(format!("no usable point cloud ({}) in {place}", ENDINGS.join(", "))).into()
+        );
     }
     std::fs::create_dir_all(&args.folder)
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
@@ -86,8 +92,19 @@ fn look(program: &Program, args: &Args) -> Result<Vec<Scan>> {
 }
 
 fn is_scan(path: &Path) -> bool {
+    has_ending(path, &ENDINGS)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
     path.extension()
-        .is_some_and(|ending| ["las", "laz"].iter().any(|known| ending.eq_ignore_ascii_case(known)))
+        .is_some_and(|ending| endings.iter().any(|known| ending.eq_ignore_ascii_case(known)))
+}
+
+impl Scan {
+    /// A text that is no point cloud, such as a table of trees: none of the campaign's scans.
+    fn is_other(&self) -> bool {
+        self.facts.is_err() && has_ending(Path::new(&self.pattern), &OFTEN_OTHER)
+    }
 }
 
 fn report(scans: &[Scan]) {
@@ -111,37 +128,55 @@ fn text(args: &Args, scans: &[Scan]) -> Result<String> {
     let folder = args.folder.canonicalize().unwrap_or_else(|_| args.folder.clone());
     let own_name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = args.name.clone().or(own_name).unwrap_or_else(|| "campaign".to_owned());
-    let quote = |text: &str| toml_edit::Value::from(text).to_string();
-    let list = |patterns: Vec<String>| {
-        let items: Vec<String> =
-            patterns.iter().map(|pattern| format!("    {},\n", quote(pattern))).collect();
-        format!("[\n{}]\n", items.concat())
-    };
     let platform: Platform = serde_json::from_value(args.platform.as_str().into())?;
     let platform = serde_json::to_value(platform)?;
     let mut text = format!(
         "name = {}\nplatform = {platform}\ninputs = {}",
         quote(&name),
-        list(patterns(args, scans))
+        list(&patterns(args, scans))
     );
-    let bad: Vec<&Scan> = scans.iter().filter(|scan| scan.facts.is_err()).collect();
-    if !bad.is_empty() {
-        text.push_str("# Files that cannot be read:\n");
-        for scan in &bad {
-            let error = scan.facts.as_ref().err().map_or("", String::as_str);
-            text.push_str(&format!("#   {}: {}\n", scan.pattern, error.replace('\n', " ")));
-        }
-        text.push_str(&format!(
-            "exclude = {}",
-            list(bad.iter().map(|scan| escape(&scan.pattern)).collect())
-        ));
-    }
+    text.push_str(&excluded(args, scans));
     let known =
         scans.iter().filter_map(|scan| scan.facts.as_ref().ok()).any(|facts| facts.crs.is_some());
     if !known {
         text.push_str("\n# The scans do not say their coordinate system. If you know it:\n# [crs]\n# epsg = 32610\n");
     }
     Ok(text)
+}
+
+/// A text as TOML.
+fn quote(text: &str) -> String {
+    toml_edit::Value::from(text).to_string()
+}
+
+/// Patterns as a TOML list, one a line.
+fn list(patterns: &[String]) -> String {
+    let items: Vec<String> =
+        patterns.iter().map(|pattern| format!("    {},\n", quote(pattern))).collect();
+    format!("[\n{}]\n", items.concat())
+}
+
+/// The key `exclude` for files that the globs name and that cannot be read, with the reasons.
+fn excluded(args: &Args, scans: &[Scan]) -> String {
+    let globs = patterns(args, scans);
+    let is_named = |scan: &&Scan| {
+        let matches =
+            |glob: &String| glob::Pattern::new(glob).is_ok_and(|glob| glob.matches(&scan.pattern));
+        !scan.is_other() || globs.iter().any(matches)
+    };
+    let bad: Vec<&Scan> =
+        scans.iter().filter(|scan| scan.facts.is_err()).filter(is_named).collect();
+    if bad.is_empty() {
+        return String::new();
+    }
+    let mut text = "# Files that cannot be read, or are no point clouds:\n".to_owned();
+    for scan in &bad {
+        let error = scan.facts.as_ref().err().map_or("", String::as_str);
+        text.push_str(&format!("#   {}: {}\n", scan.pattern, error.replace('\n', " ")));
+    }
+    let names: Vec<String> = bad.iter().map(|scan| escape(&scan.pattern)).collect();
+    text.push_str(&format!("exclude = {}", list(&names)));
+    text
 }
 
 /// One glob for each ending and depth that occurs, or the files by name when they lie elsewhere.
@@ -164,4 +199,45 @@ fn patterns(args: &Args, scans: &[Scan]) -> Vec<String> {
 /// A path as a glob that names it alone.
 fn escape(path: &str) -> String {
     glob::Pattern::escape(path)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scan(pattern: &str, usable: bool) -> Scan {
+        let facts = FileFacts {
+            points: 1,
+            rect_m: None,
+            density_per_m2: None,
+            crs: None,
+            notes: Vec::new(),
+        };
+        let facts = if usable { Ok(facts) } else { Err("no points".to_owned()) };
+        Scan { pattern: pattern.to_owned(), facts }
+    }
+
+    #[test]
+    fn tables_are_excluded_only_where_a_glob_names_them() {
+        let args = Args {
+            folder: PathBuf::new(),
+            scans: Vec::new(),
+            name: None,
+            platform: "tls".to_owned(),
+            force: false,
+        };
+        let table = || scan("trees.csv", false);
+        assert_eq!(excluded(&args, &[scan("a.xyz", true), table()]), "");
+        let listed = excluded(&args, &[scan("a.csv", true), table()]);
+        assert!(listed.contains("exclude = [\n    \"trees.csv\",\n]"), "{listed}");
+        assert!(excluded(&args, &[scan("a.xyz", true), scan("b.e57", false)]).contains("b.e57"));
+    }
+
+    #[test]
+    fn endings_of_all_formats_are_known() {
+        for name in ["a.LAS", "b.copc.laz", "c.e57", "d.ply", "e.pcd", "f.pts", "g.xyz", "h.TXT"] {
+            assert!(is_scan(Path::new(name)), "{name}");
+        }
+        assert!(!is_scan(Path::new("campaign.toml")) && !is_scan(Path::new("las")));
+    }
 }

@@ -69,7 +69,8 @@ impl Opened {
         let (pipeline, campaign) =
             both(Pipeline::load(&path, &program.registry), Campaign::load(&place.campaign))?;
         let presence = work.enter()?;
-        let notes = Notes::open(work.note("files.json"));
+        // A new name whenever a surveyor tells other things about the same file.
+        let notes = Notes::open(work.note("files-2.json"));
         let survey = survey::survey(&campaign, &*program.surveyor, &notes)
             .map_err(|what| Problems::one(Problem::new(&campaign.path, None, what)))?;
         let store = Store::open(&work);

@@ -56,7 +56,7 @@ pub struct CampaignFile {
     pub name: String,
     /// How the scans were taken.
     pub platform: Platform,
-    /// Raw files: paths or globs (`scans/*.laz`, `**/*.las`), relative to the campaign's folder.
+    /// Raw files: paths or globs (`scans/*.laz`, `**/*.e57`), relative to the campaign's folder.
     #[schemars(length(min = 1))]
     pub inputs: Vec<String>,
     /// Paths or globs of files to leave out.
