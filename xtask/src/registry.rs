@@ -4,13 +4,16 @@ use serde_json::Value;
 use std::sync::Arc;
 use timberline_artefact::stage::{DynStage, erase};
 use timberline_crowns::stage::{CrownFitStage, CrownModelStage, DetectionStage};
-use timberline_export::stage::ExportStage;
+use timberline_export::stage::{ExportStage, TreeModelsStage, TreeTablesStage};
 use timberline_ground::stage::{DtmStage, GroundStage};
 use timberline_ingest::stage::{Scatter, Tiles};
-use timberline_report::stage::MapStage;
+use timberline_qsm::stage::CylindersStage;
+use timberline_report::stage::{MapStage, PlotMapStage, TreePicturesStage};
 use timberline_segmentation::stage::{SegmentationStage, TreeLabelsStage};
+use timberline_skeleton::stage::SkeletonStage;
 use timberline_stems::stage::{StemsStage, TreeCloudStage};
 use timberline_treetops::stage::TreetopsStage;
+use timberline_wlop::stage::ConsolidationStage;
 
 /// A stage without its types.
 pub type AnyStage = Arc<dyn DynStage>;
@@ -53,6 +56,13 @@ impl Registry {
             erase::<StemsStage>(),
             erase::<TreeLabelsStage>(),
             erase::<TreeCloudStage>(),
+            erase::<ConsolidationStage>(),
+            erase::<SkeletonStage>(),
+            erase::<CylindersStage>(),
+            erase::<TreeModelsStage>(),
+            erase::<TreePicturesStage>(),
+            erase::<TreeTablesStage>(),
+            erase::<PlotMapStage>(),
             erase::<ExportStage>(),
             erase::<MapStage>(),
         ])

@@ -15,7 +15,7 @@ mod architecture {
     use std::path::{Path, PathBuf};
 
     /// Side by side: none knows another.
-    const STAGE_CRATES: [&str; 11] = [
+    const STAGE_CRATES: [&str; 12] = [
         "ingest",
         "ground",
         "treetops",

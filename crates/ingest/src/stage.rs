@@ -156,9 +156,7 @@ fn tile_facts(gathered: &Gathered, grid: TileGrid) -> Facts {
             max: world(local.max),
         }),
         grid: Some(grid),
-        counts: counts.into_iter().map(|(name, count)| (name.to_owned(), count)).collect(),
-        ..Facts::default()
         counts: counts.map(|(name, count)| (name.to_owned(), count)).collect(),
-        parts: Vec::new(),
+        ..Facts::default()
     }
 }
