@@ -78,19 +78,19 @@ pub fn check(nodes: &[SkeletonNode]) -> Result<(), Error> {
     if nodes.len() < 2 { Err(Error::NoSegment { nodes: nodes.len() }) } else { Ok(()) }
 }
 
-/// Takes a skeleton apart: at every fork the branch goes on where [`goes_on`] says and others begin.
-/// The stem comes first, every branch after the one it grows on.
+/// Takes a skeleton apart: at every fork the branch goes on in the child that reaches far and straight
+/// on, and others begin. The stem comes first, every branch after the one it grows on.
 ///
 /// # Errors
 /// As [`check`], and [`Error::NoSegment`] when all nodes are in one place.
 pub fn split(nodes: &[SkeletonNode]) -> Result<Vec<Branch>, Error> {
     check(nodes)?;
-    let children = children(nodes);
-    let reach = reaches(nodes);
+    let tree = Tree { nodes, children: children(nodes), reach: reaches(nodes) };
     let mut branches: Vec<Branch> = Vec::new();
-    // Where a branch begins: node before it, its own first node, where that is on its parent.
-    let mut waiting = VecDeque::from([(0usize, None::<(usize, Fork)>)]);
-    while let Some((first, from)) = waiting.pop_front() {
+    // Where branches begin: the node before, that on its branch, and the branch's own first node.
+    let mut waiting = VecDeque::from([(None::<(usize, Fork)>, 0usize)]);
+    while let Some((from, first)) = waiting.pop_front() {
+        let walk = tree.walk(from.map(|(node, _)| node), first);
         let mut branch = Branch {
             path_m: Vec::new(),
             radius_m: Vec::new(),
@@ -98,22 +98,9 @@ pub fn split(nodes: &[SkeletonNode]) -> Result<Vec<Branch>, Error> {
             order: from.map_or(0, |(_, fork)| branches[fork.branch as usize].order + 1),
             begin_m: 0.0,
         };
-        let mut length = 0.0;
-        let mut path = from.map(|(node, _)| node).into_iter().chain([first]).collect::<Vec<_>>();
-        let mut sides = Vec::new();
-        while let Some(&node) = path.last() {
-            if let [.., before, _] = path[..] {
-                length += distance(nodes[before].position_m, nodes[node].position_m);
-            }
-            let before = path.len().checked_sub(2).map(|place| path[place]);
-            let Some(next) = goes_on(nodes, &children[node], &reach, before, node) else { break };
-            let others = children[node].iter().filter(|child| **child != next);
-            sides.extend(others.map(|child| (*child, node, length)));
-            path.push(next);
-        }
-        fill(&mut branch, nodes, &path);
+        fill(&mut branch, nodes, &walk.path);
         if branch.path_m.len() < 2 {
-            // A stem without length, from whose one place everything grows, or an empty twig.
+            // All of it in one place: an empty twig, or no tree.
             if branches.is_empty() {
                 return Err(Error::NoSegment { nodes: nodes.len() });
             }
@@ -121,13 +108,46 @@ pub fn split(nodes: &[SkeletonNode]) -> Result<Vec<Branch>, Error> {
         }
         let number = branches.len() as u32;
         branches.push(branch);
-        waiting.extend(
-            sides
-                .into_iter()
-                .map(|(child, node, at_m)| (child, Some((node, Fork { branch: number, at_m })))),
-        );
+        let begins = |(child, node, at_m)| (Some((node, Fork { branch: number, at_m })), child);
+        waiting.extend(walk.sides.into_iter().map(begins));
     }
     Ok(branches)
+}
+
+/// A skeleton with what is asked of it at forks.
+struct Tree<'a> {
+    nodes: &'a [SkeletonNode],
+    children: Vec<Vec<usize>>,
+    reach: Vec<f64>,
+}
+
+/// The nodes of a branch, and what leaves it: first node, node it leaves at, how far along that is, m.
+struct Walk {
+    path: Vec<usize>,
+    sides: Vec<(usize, usize, f64)>,
+}
+
+impl Tree<'_> {
+    /// Follows a branch to its tip.
+    fn walk(&self, before: Option<usize>, first: usize) -> Walk {
+        let mut walk =
+            Walk { path: before.into_iter().chain([first]).collect(), sides: Vec::new() };
+        let mut length = 0.0;
+        let (mut before, mut node) = (before, first);
+        loop {
+            if let Some(before) = before {
+                length += distance(self.nodes[before].position_m, self.nodes[node].position_m);
+            }
+            let children = &self.children[node];
+            let Some(next) = goes_on(self.nodes, children, &self.reach, before, node) else {
+                return walk;
+            };
+            let others = children.iter().filter(|child| **child != next);
+            walk.sides.extend(others.map(|child| (*child, node, length)));
+            walk.path.push(next);
+            (before, node) = (Some(node), next);
+        }
+    }
 }
 
 /// Copies the nodes of a path, without those in the place of the one before.

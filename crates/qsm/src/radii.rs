@@ -6,10 +6,11 @@
 //! towards the pipe model as far as it is uncertain: noise makes thin branches look thick.
 
 use crate::branches::Branch;
+use crate::fit::Fit;
 use crate::measure::Measured;
 use crate::monotone::{Robust, decreasing, robust_decreasing};
 use crate::pipe::{Evidence, PipeModel};
-use crate::sections::Sections;
+use crate::sections::{Section, Sections};
 use crate::{Params, RadiusSource};
 
 /// A section is no circle: standard deviation of its radius over itself. Stems are oval by some
@@ -134,6 +135,25 @@ struct Known {
     arc_coverage: f64,
 }
 
+impl Known {
+    /// A fit with all errors that it can have; `common_m` is the error that its points share.
+    fn new(place: usize, section: &Section, fit: &Fit, expected_m: f64, common_m: f64) -> Self {
+        let rough = ROUNDNESS * fit.radius_m;
+        let sd_m =
+            libm::sqrt(fit.radius_sd_m * fit.radius_sd_m + rough * rough + common_m * common_m);
+        Self {
+            place,
+            at_m: section.middle_m(),
+            radius_m: fit.radius_m,
+            sd_m,
+            log_ratio: libm::log(fit.radius_m / expected_m),
+            log_sd: sd_m / fit.radius_m,
+            points: fit.points,
+            arc_coverage: fit.arc_coverage,
+        }
+    }
+}
+
 /// Radii of one branch; `parent` is radius and standard error of the branch below at the fork.
 fn of_branch(
     given: &Given<'_>,
@@ -182,25 +202,12 @@ fn plausible(
     let rows = given.sections.all[range.clone()].iter().zip(&given.measured[range]).enumerate();
     let common = COMMON_NOISE * given.noise_m;
     let rows = rows.filter_map(|(place, (section, measured))| {
-        let fit = measured.as_ref()?.fit;
-        let rough = ROUNDNESS * fit.radius_m;
-        let sd_m = libm::sqrt(fit.radius_sd_m * fit.radius_sd_m + rough * rough + common * common);
-        let log_ratio = libm::log(fit.radius_m / expected[place]);
-        let log_sd = sd_m / fit.radius_m;
-        let known = Known {
-            place,
-            at_m: section.middle_m(),
-            radius_m: fit.radius_m,
-            sd_m,
-            log_ratio,
-            log_sd,
-            points: fit.points,
-            arc_coverage: fit.arc_coverage,
-        };
+        let known = Known::new(place, section, &measured.as_ref()?.fit, expected[place], common);
         let Some((below, below_sd)) = parent else { return Some(known) };
-        let allowed = TOO_FAR * libm::sqrt(scatter * scatter + log_sd * log_sd);
-        let wider = TOO_FAR * libm::sqrt(sd_m * sd_m + below_sd * below_sd);
-        (log_ratio.abs() <= allowed && fit.radius_m <= below + wider).then_some(known)
+        let allowed = TOO_FAR * libm::hypot(scatter, known.log_sd);
+        let wider = TOO_FAR * libm::hypot(known.sd_m, below_sd);
+        let likely = known.log_ratio.abs() <= allowed && known.radius_m <= below + wider;
+        likely.then_some(known)
     });
     let found: Vec<Known> = rows.collect();
     if parent.is_none() {
