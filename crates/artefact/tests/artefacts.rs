@@ -44,6 +44,13 @@ fn read_any(kind: &str, path: &Path) -> Result<(), Error> {
         "labels" => full::<Labels>(path),
         "trees" => full::<Trees>(path),
         "outputs" => full::<Outputs>(path),
+        "stems" => full::<Stems>(path),
+        "tree-cloud" => full::<TreeCloud>(path),
+        "consolidated" => full::<Consolidated>(path),
+        "skeletons" => full::<Skeletons>(path),
+        "qsm" => full::<Qsm>(path),
+        "model-files" => full::<ModelFiles>(path),
+        "picture-files" => full::<PictureFiles>(path),
         _ => unreachable!("{kind}"),
     }
 }
@@ -288,6 +295,13 @@ fn golden_files_of_older_versions_are_migrated_or_refused_by_name() {
     read_older::<Labels>();
     read_older::<Trees>();
     read_older::<Outputs>();
+    read_older::<Stems>();
+    read_older::<TreeCloud>();
+    read_older::<Consolidated>();
+    read_older::<Skeletons>();
+    read_older::<Qsm>();
+    read_older::<ModelFiles>();
+    read_older::<PictureFiles>();
     assert_eq!(Trees::READABLE, [1, 2, 3]);
     assert_eq!(Treetops::READABLE, [1, 2]);
 }

@@ -40,7 +40,7 @@ impl BaseSource {
 /// One tree, before it is modelled.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stem {
-    /// Made from the position of the base, see [`crate::tree_id`].
+    /// Made from the position of the base, see [`crate::tree_id()`].
     pub tree_id: u64,
     /// Where the stem's axis meets the ground, world, m.
     pub base_m: [f64; 3],

@@ -1,5 +1,7 @@
 //! One example of every kind.
 
+mod of_trees;
+
 use std::path::{Path, PathBuf};
 use timberline_artefact::alone::Alone;
 use timberline_artefact::kinds::*;
@@ -154,5 +156,12 @@ pub(crate) fn write_all(folder: &Path) -> Vec<(&'static str, PathBuf)> {
     put(&mut store, &mut paths, &Labels { tree_id: vec![0, 42], score: vec![0.0, 0.9] });
     put(&mut store, &mut paths, &Trees { trees: vec![tree()] });
     put(&mut store, &mut paths, &outputs());
+    put(&mut store, &mut paths, &of_trees::stems());
+    put(&mut store, &mut paths, &of_trees::tree_cloud());
+    put(&mut store, &mut paths, &of_trees::consolidated());
+    put(&mut store, &mut paths, &of_trees::skeletons());
+    put(&mut store, &mut paths, &of_trees::qsm());
+    put(&mut store, &mut paths, &ModelFiles { files: of_trees::files() });
+    put(&mut store, &mut paths, &PictureFiles { files: of_trees::files() });
     paths
 }
