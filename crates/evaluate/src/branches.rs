@@ -83,6 +83,17 @@ impl BranchCounts {
     pub fn missing(&self) -> u32 {
         self.reference - self.found
     }
+
+    fn add(&mut self, other: &Self) {
+        self.reference += other.reference;
+        self.found += other.found;
+        self.model += other.model;
+        self.false_branches += other.false_branches;
+        self.reference_m += other.reference_m;
+        self.found_m += other.found_m;
+        self.model_m += other.model_m;
+        self.false_m += other.false_m;
+    }
 }
 
 /// How the branches of a model compare.
@@ -142,6 +153,17 @@ pub fn assess_branches(
 }
 
 impl BranchAccuracy {
+    /// Adds the branches of another tree, counted with the same parameters.
+    pub fn add(&mut self, other: &Self) {
+        self.all.add(&other.all);
+        for (own, other) in
+            [(&mut self.by_order, &other.by_order), (&mut self.by_class, &other.by_class)]
+        {
+            own.resize(own.len().max(other.len()), BranchCounts::default());
+            own.iter_mut().zip(other).for_each(|(own, other)| own.add(other));
+        }
+    }
+
     /// Does something to all counts that a branch belongs to.
     fn each(
         &mut self,

@@ -83,11 +83,21 @@ pub fn between_models(
     reference: &CylinderModel<'_>,
     spacing_m: f64,
 ) -> Result<BothWays, Error> {
+    let forth = from_surface(model, reference, spacing_m)?;
+    Ok(BothWays { forth, back: from_surface(reference, model, spacing_m)? })
+}
+
+/// Distances from the surface of one model to that of another.
+///
+/// # Errors
+/// [`Error::Parameter`] for a spacing that is not positive.
+pub fn from_surface(
+    from: &CylinderModel<'_>,
+    to: &CylinderModel<'_>,
+    spacing_m: f64,
+) -> Result<DistanceSummary, Error> {
     check_spacing(spacing_m)?;
-    let way = |from: &CylinderModel<'_>, to: &CylinderModel<'_>| {
-        DistanceSummary::of(&mut found(to.index().nearest_all(&from.surface(spacing_m))))
-    };
-    Ok(BothWays { forth: way(model, reference), back: way(reference, model) })
+    Ok(DistanceSummary::of(&mut found(to.index().nearest_all(&from.surface(spacing_m)))))
 }
 
 /// Distances from positions to the nearest point.

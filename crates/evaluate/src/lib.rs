@@ -6,7 +6,8 @@
 //! gathers them in a structure that serialises and prints as a table. Files are the caller's affair.
 //!
 //! Tree models: distances between points and models ([`distances`]), false and missing branches and
-//! volumes ([`branches`]), stems found and their diameters ([`stems`]).
+//! volumes ([`branches`]), stems found and their diameters ([`stems`]); [`models`] assesses all of a
+//! plot's trees by them.
 //!
 //! All positions and lengths are metres, in any one frame. No result depends on the order of input.
 //!
@@ -28,6 +29,7 @@ pub mod distances;
 mod error;
 pub mod labels;
 pub mod matching;
+pub mod models;
 pub mod report;
 pub mod stats;
 pub mod stems;
@@ -39,6 +41,7 @@ pub use distances::{BothWays, CylinderModel, Hausdorff};
 pub use error::Error;
 pub use labels::{LabelAccuracy, assess_labels};
 pub use matching::{MatchParams, MatchRule, Matching, Pair, match_trees};
+pub use models::{ModelParams, Piece, PlotAccuracy, TreeModel, assess_models};
 pub use report::Report;
 pub use stats::ErrorStats;
 pub use stems::{Stem, StemAccuracy, assess_stems};

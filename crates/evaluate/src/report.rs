@@ -1,6 +1,6 @@
 //! Everything assessed about a result, to serialise and to print.
 
-use crate::{Accuracy, BoxAccuracy, ErrorStats, LabelAccuracy, TreeAccuracy};
+use crate::{Accuracy, BoxAccuracy, ErrorStats, LabelAccuracy, PlotAccuracy, TreeAccuracy};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -42,6 +42,9 @@ pub struct Report {
     /// Methods of finding positions, side by side.
     #[serde(default)]
     pub positions: Vec<MethodErrors>,
+    /// Models of the trees of a plot.
+    #[serde(default)]
+    pub models: Option<PlotAccuracy>,
 }
 
 impl Report {
@@ -57,7 +60,7 @@ impl Report {
     }
 
     fn all_errors(&self) -> Vec<NamedErrors> {
-        let mut all = Vec::new();
+        let mut all = self.models.as_ref().map_or_else(Vec::new, PlotAccuracy::errors);
         if let Some(trees) = &self.trees {
             let of_trees = [
                 ("position", "m", trees.position_m),
@@ -104,6 +107,9 @@ impl fmt::Display for Report {
                 labels.purity,
                 labels.mean_iou
             )?;
+        }
+        if let Some(models) = &self.models {
+            write!(f, "\n{models}")?;
         }
         write_errors(f, &self.all_errors())?;
         write_positions(f, &self.positions)

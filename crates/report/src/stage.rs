@@ -7,7 +7,9 @@ mod plot_map;
 mod tree_pictures;
 
 pub use plot_map::{Params as PlotMapParams, PlotMapStage};
-pub use tree_pictures::{ColourBy, Params as TreePicturesParams, TreePicturesStage};
+pub use tree_pictures::{
+    ColourBy, Params as TreePicturesParams, TreePicturesStage, tree_picture, wood_of_points,
+};
 
 use crate::figure::LONGEST_PX;
 use crate::map::{MapContents, MapTree, draw};

@@ -2,11 +2,13 @@
 
 use crate::colour::Rgb;
 use crate::tree::{Rod, TreePicture, draw};
+use crate::{Canvas, Error};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use timberline_artefact::kinds::{Distances, PictureFiles, Qsm, RadiusSource, TreeCloud, TreeFile};
 use timberline_artefact::stage::{Context, InputSpec, Inputs, Stage, StageError, StageInfo};
 use timberline_artefact::{Facts, Kind, UnitKind};
+use timberline_pointcloud::{Frame, PointCloud};
 
 /// By what cylinders are coloured.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -65,25 +67,41 @@ impl Stage for TreePicturesStage {
         let (header, qsm) = inputs.own::<Qsm>()?;
         let cloud = inputs.own::<TreeCloud>()?.1.cloud;
         let frame = header.facts.frame.ok_or("a tree model without a frame")?;
-        let cloud = cloud.in_frame(frame);
-        let wood = cloud.extra.get(TreeCloud::WOOD);
-        let points: Vec<([f64; 3], f32)> = (0..cloud.len())
-            .map(|i| (cloud.local(i), wood.map_or(f32::NAN, |column| column.value(i) as f32)))
-            .collect();
-        let rods = rods(&qsm, params.colour_by);
-        let canvas = draw(&TreePicture {
-            title: &format!("Tree {}", qsm.tree_id),
-            lines: &lines(&qsm),
-            points: &points,
-            rods: &rods,
-            base_m: frame.local_from_world(qsm.base_m),
-            legend: &legend(&qsm, params.colour_by),
-        })?;
+        let canvas = tree_picture(&qsm, frame, &cloud, params.colour_by)?;
         let file = TreeFile { name: "tree.png".to_owned(), bytes: canvas.png()? };
         let facts = Facts::located_like(&header.facts).count("files", 1);
         context.emit(&PictureFiles { files: vec![file] }, facts)?;
         Ok(())
     }
+}
+
+/// The picture of a tree from its model, whose positions are in `frame`, and its points in any frame.
+///
+/// # Errors
+/// As [`draw`].
+pub fn tree_picture(
+    qsm: &Qsm,
+    frame: Frame,
+    cloud: &PointCloud,
+    colour_by: ColourBy,
+) -> Result<Canvas, Error> {
+    draw(&TreePicture {
+        title: &format!("Tree {}", qsm.tree_id),
+        lines: &lines(qsm),
+        points: &wood_of_points(&cloud.in_frame(frame)),
+        rods: &rods(qsm, colour_by),
+        base_m: frame.local_from_world(qsm.base_m),
+        legend: &legend(qsm, colour_by),
+    })
+}
+
+/// The points of a tree in the frame of the cloud, with how likely each is on wood; NaN where the cloud
+/// does not tell.
+#[must_use]
+pub fn wood_of_points(cloud: &PointCloud) -> Vec<([f64; 3], f32)> {
+    let wood = cloud.extra.get(TreeCloud::WOOD);
+    let likelihood = |i: usize| wood.map_or(f32::NAN, |column| column.value(i) as f32);
+    (0..cloud.len()).map(|i| (cloud.local(i), likelihood(i))).collect()
 }
 
 /// Colours of radius sources, from the palette of Okabe and Ito (2008).
