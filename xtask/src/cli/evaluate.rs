@@ -1,4 +1,6 @@
-//! `evaluate`: the trees and the terrain of a run against known ones.
+//! `evaluate`: the trees, the tree models and the terrain of a run against known ones.
+
+mod models;
 
 use super::known::{
     Filter, Position, STEMS, artefacts, as_tree, clusters, read_trees, stems_of_found, trees_of_run,
@@ -22,6 +24,9 @@ use timberline_experiment::crowns::{Comparison, Outcome, compare, plan};
 /// Radius in which the top height is taken that tells the layer of a tree: plots of 0.03 ha.
 const LAYER_RADIUS_M: f64 = 10.0;
 
+const NO_CYLINDERS: &str = "nothing to compare the tree models with: give --cylinders, or `cylinders` \
+    in [truth] of campaign.toml";
+
 /// Arguments of `evaluate`.
 #[derive(Debug, clap::Args)]
 #[command(
@@ -30,6 +35,9 @@ const LAYER_RADIUS_M: f64 = 10.0;
     for --position apex: top_x_m, top_y_m or x, y; for --position stem: base_x_m, base_y_m or stem_x, stem_y;\n  \
     optional: crown_diameter_m or crown_radius_m; visible (0 leaves the tree out with --visible).\n\
     The terrain is an ESRI ASCII raster.\n\
+    Where the run made tree models: dbh_cm, stem_m3, branches_from_5cm_m3, branches_below_5cm_m3 of the trees, and the \
+    table of cylinders with tree_id, cylinder, parent (0: none), branch, order (0: stem), start_x_m, start_y_m, start_z_m, \
+    end_x_m, end_y_m, end_z_m, start_radius_mm, end_radius_mm; positions in the world or from any corner at whole metres.\n\
     With base_x_m, base_y_m or stem_x, stem_y, the crowns of the run are fitted by every method, and their distances to the stems \
     are printed side by side: as the run chose, hull centroid, highest point, L2, L1, L1 with the run's prior."
 )]
@@ -44,15 +52,18 @@ pub struct Args {
     /// Known terrain [default: `dtm` in [truth] of campaign.toml]
     #[arg(long, value_name = "ASC")]
     dtm: Option<PathBuf>,
+    /// Known wood as cylinders, for tree models [default: `cylinders` in [truth] of campaign.toml]
+    #[arg(long, value_name = "CSV")]
+    cylinders: Option<PathBuf>,
     /// Trees to judge [default: those of the run]
     #[arg(long, value_name = "CSV")]
     trees: Option<PathBuf>,
     /// Which position is compared
     #[arg(long, value_enum, default_value_t = Position::Apex)]
     position: Position,
-    /// Largest distance at which two trees may be the same, m
-    #[arg(long, value_name = "M", default_value_t = 2.0)]
-    distance: f64,
+    /// Largest distance at which two trees may be the same, m [default: 2; of stems with models 0.5]
+    #[arg(long, value_name = "M")]
+    distance: Option<f64>,
     /// Largest difference of their heights, m [default: no limit]
     #[arg(long, value_name = "M")]
     height_difference: Option<f64>,
@@ -92,8 +103,14 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
         Report::new(format!("{} over {}", opened.pipeline.name, opened.campaign.file.name));
     let dry =
         DryRun::new(&opened.pipeline, &opened.survey, &opened.store).map_err(anyhow::Error::msg)?;
-    if let Some(path) = truth {
-        add_trees(&mut report, args, &opened, &dry, &path)?;
+    match truth {
+        Some(path) if args.trees.is_none() && models::made_by(&opened) => {
+            let cylinders = args.cylinders.clone().or_else(|| of_campaign(known.cylinders));
+            let cylinders = cylinders.ok_or_else(|| Usage(NO_CYLINDERS.to_owned()))?;
+            report.models = Some(models::assess(args, &opened, &dry, [&path, &cylinders])?);
+        }
+        Some(path) => add_trees(&mut report, args, &opened, &dry, &path)?,
+        None => {}
     }
     if let Some(path) = dtm {
         report.add_errors("terrain", "m", terrain(&opened, &dry, &path)?);
@@ -140,7 +157,7 @@ fn add_trees(
 
 fn match_params(args: &Args) -> MatchParams {
     MatchParams {
-        max_distance_m: args.distance,
+        max_distance_m: args.distance.unwrap_or(MatchParams::default().max_distance_m),
         max_height_difference_m: args.height_difference,
         rule: if args.optimal { MatchRule::Optimal } else { MatchRule::TallestFirst },
     }

@@ -1,5 +1,7 @@
 //! `inspect`: what an artefact holds.
 
+mod of_trees;
+
 use super::out::{self, Table};
 use super::{DONE, Usage, picture};
 use crate::engine::progress::{bytes, short};
@@ -8,8 +10,9 @@ use serde::Serialize;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{
-    self, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels, Outputs, PointTile,
-    Shards, Trees, Treetops,
+    self, Consolidated, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels,
+    ModelFiles, Outputs, PictureFiles, PointTile, Qsm, Shards, Skeletons, Stems, TreeCloud, Trees,
+    Treetops,
 };
 use timberline_artefact::{Header, InputRef, Kind, Opened};
 
@@ -166,6 +169,17 @@ fn tables(path: &Path, header: &Header) -> Result<Vec<(String, Rows)>> {
         PointTile::NAME => {
             let (_, tile) = timberline_artefact::read::<PointTile>(path)?;
             serde_json::to_value(&tile.cloud)?
+        }
+        Stems::NAME => payload::<Stems>(path)?,
+        TreeCloud::NAME => of_trees::tree_cloud(path)?,
+        Consolidated::NAME => of_trees::consolidated(path)?,
+        Skeletons::NAME => payload::<Skeletons>(path)?,
+        Qsm::NAME => of_trees::qsm(path)?,
+        ModelFiles::NAME => {
+            of_trees::files(&timberline_artefact::read::<ModelFiles>(path)?.1.files)
+        }
+        PictureFiles::NAME => {
+            of_trees::files(&timberline_artefact::read::<PictureFiles>(path)?.1.files)
         }
         Shards::NAME => Value::Null,
         other => anyhow::bail!("`{other}` is a kind this program does not know"),

@@ -1,11 +1,13 @@
 //! Pictures of single artefacts, for `inspect --png`.
 
+mod of_trees;
+
 use super::Usage;
 use anyhow::{Context, Result, bail};
 use std::path::{Path, PathBuf};
 use timberline_artefact::kinds::{
-    CrownModel, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels, PointTile,
-    Trees, Treetops,
+    Consolidated, CrownModel, CrownModels, Detections, GroundModel, GroundPoints, Heights, Labels,
+    PictureFiles, PointTile, Qsm, Skeletons, TreeCloud, Trees, Treetops,
 };
 use timberline_artefact::{Header, Kind, read};
 use timberline_report::Grid;
@@ -20,6 +22,9 @@ const UNCLASSIFIED: u8 = 1;
 /// # Errors
 /// When the kind has no picture, there is nothing to draw, or a file cannot be read or written.
 pub fn write(path: &Path, header: &Header, target: &Path) -> Result<()> {
+    if header.kind == PictureFiles::NAME {
+        return of_trees::copy(path, target);
+    }
     let canvas = draw(path, header)?;
     canvas.write_png(target).with_context(|| format!("cannot write {}", target.display()))
 }
@@ -45,6 +50,10 @@ fn draw(path: &Path, header: &Header) -> Result<Canvas> {
         PointTile::NAME | GroundPoints::NAME | Heights::NAME | Labels::NAME => {
             points(&heading, path, header)?
         }
+        TreeCloud::NAME => of_trees::tree_cloud(&heading, path)?,
+        Consolidated::NAME => of_trees::consolidated(&heading, path)?,
+        Skeletons::NAME => of_trees::skeletons(&heading, path)?,
+        Qsm::NAME => of_trees::qsm(path, header)?,
         kind => {
             let message =
                 format!("`{kind}` has no picture; draw the points, terrain or trees made from it");
@@ -86,7 +95,7 @@ fn points(heading: &Heading<'_>, path: &Path, header: &Header) -> Result<Canvas>
             PointColour::Value(&elevation, "Elevation [m]"),
         )?);
     }
-    let mut cloud = read::<PointTile>(&tile_of(path, header)?)?.1.cloud;
+    let mut cloud = read::<PointTile>(&input_of::<PointTile>(path, header)?)?.1.cloud;
     Ok(match header.kind.as_str() {
         Heights::NAME => {
             let heights = read::<Heights>(path)?.1.height_m;
@@ -120,20 +129,14 @@ fn same_length(points: usize, values: usize) -> Result<()> {
     Ok(())
 }
 
-/// The file in the same store that holds the points an artefact speaks of.
-fn tile_of(path: &Path, header: &Header) -> Result<PathBuf> {
+/// The file in the same store that holds the points an artefact speaks of, as one of its inputs.
+fn input_of<K: Kind>(path: &Path, header: &Header) -> Result<PathBuf> {
     let input = header
         .inputs
         .iter()
-        .find(|input| input.kind == PointTile::NAME && input.unit == header.unit)
+        .find(|input| input.kind == K::NAME && input.unit == header.unit)
         .context("the artefact does not say from which points it was made")?;
-    let name = format!(
-        "{}-{}.{}.{}",
-        input.unit.file_stem(),
-        input.key,
-        PointTile::NAME,
-        PointTile::EXTENSION
-    );
+    let name = format!("{}-{}.{}.{}", input.unit.file_stem(), input.key, K::NAME, K::EXTENSION);
     let store = path.parent().and_then(Path::parent).unwrap_or(Path::new(".."));
     let folders =
         std::fs::read_dir(store).with_context(|| format!("cannot read {}", store.display()))?;

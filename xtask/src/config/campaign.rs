@@ -129,6 +129,8 @@ pub struct TruthFile {
     pub trees: Option<PathBuf>,
     /// Terrain, an ESRI ASCII raster.
     pub dtm: Option<PathBuf>,
+    /// Wood of every tree as cylinders, a CSV file (columns: see `cargo xtask evaluate --help`).
+    pub cylinders: Option<PathBuf>,
 }
 
 /// A raw file of the campaign.

@@ -382,6 +382,44 @@ fn inspect_shows_what_is_inside() {
 }
 
 #[test]
+fn inspect_shows_every_kind() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/artefact/golden");
+    let stand = ran_once();
+    let expected = |kind: &str| match kind {
+        "stems" => ["stems: 2 rows", "base_source=\"LowestPoints\"", "runs: 2 rows"],
+        "tree-cloud" => ["stem: 1 rows", "values: 40 rows", "extra.values: 40 rows"],
+        "consolidated" => ["consolidation: 1 rows", "points_left_alone=20", "values: 40 rows"],
+        "skeletons" => ["raw.nodes: 2 rows", "consolidated.nodes: 1 rows", "radius_m=0.1"],
+        "qsm" => ["metrics: 1 rows", "taper: 1 rows", "source=\"Inferred\""],
+        "model-files" | "picture-files" => ["files: 2 rows", "name=\"qsm.csv\"", "bytes=11"],
+        _ => ["stage", "unit", "key"],
+    };
+    for kind in timberline_artefact::kinds::all().iter().filter(|kind| kind.name != "shards") {
+        let name = format!("{}-v{}.{}", kind.name, kind.version, kind.extension);
+        let shown = inspected(&stand, &golden.join(name));
+        assert!(shown.contains(&format!("kind           {} ", kind.name)), "{}", kind.name);
+        for part in expected(kind.name) {
+            assert!(shown.contains(part), "{part} in\n{shown}");
+        }
+    }
+}
+
+#[test]
+fn inspect_draws_trees() {
+    let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/artefact/golden");
+    let stand = ran_once();
+    for name in ["tree-cloud-v1.mcap", "consolidated-v1.mcap", "skeletons-v1.tmbr"] {
+        let (path, target) = (golden.join(name), stand.path(&format!("{name}.png")));
+        let args = ["inspect", path.to_str().unwrap(), "--png", target.to_str().unwrap()];
+        let mut command = stand.command(&args, &[]);
+        command.env("XTASK_TEST_ARGS", serde_json::to_string(&args).unwrap());
+        let ended = crate::support::ended(command.spawn().unwrap());
+        assert_eq!(ended.code, 0, "{}", ended.stderr);
+        assert!(std::fs::read(&target).unwrap().starts_with(b"\x89PNG"), "{name}");
+    }
+}
+
+#[test]
 fn inspect_shows_an_older_version_as_the_present_one() {
     let golden = Path::new(env!("CARGO_MANIFEST_DIR")).join("../crates/artefact/golden");
     let stand = ran_once();

@@ -67,7 +67,7 @@ impl Stage for TreePicturesStage {
         let (header, qsm) = inputs.own::<Qsm>()?;
         let cloud = inputs.own::<TreeCloud>()?.1.cloud;
         let frame = header.facts.frame.ok_or("a tree model without a frame")?;
-        let canvas = tree_picture(&qsm, frame, &cloud, params.colour_by)?;
+        let canvas = tree_picture(&qsm, frame, cloud, params.colour_by)?;
         let file = TreeFile { name: "tree.png".to_owned(), bytes: canvas.png()? };
         let facts = Facts::located_like(&header.facts).count("files", 1);
         context.emit(&PictureFiles { files: vec![file] }, facts)?;
@@ -82,7 +82,7 @@ impl Stage for TreePicturesStage {
 pub fn tree_picture(
     qsm: &Qsm,
     frame: Frame,
-    cloud: &PointCloud,
+    cloud: PointCloud,
     colour_by: ColourBy,
 ) -> Result<Canvas, Error> {
     draw(&TreePicture {

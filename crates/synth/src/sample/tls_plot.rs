@@ -87,4 +87,5 @@ inputs = ["scans/*.laz"]
 [truth]
 trees = "truth/trees.csv"
 dtm = "truth/dtm.asc"
+cylinders = "truth/cylinders.csv"
 "#;
