@@ -348,7 +348,7 @@ mod architecture {
             "ctrlc",
             "tracing-subscriber",
         ];
-        let homes: [(&[&str], &[&str]); 13] = [
+        let homes: [(&[&str], &[&str]); 14] = [
             (terminal, &["xtask"]),
             (&["laz"], &["ingest"]),
             (&["las"], &["export", "segmentation"]),

@@ -174,6 +174,21 @@ impl PlotAccuracy {
     }
 }
 
+impl ModelParams {
+    /// Adds a class for branches thinner than any that the truth lists: what a model has of them may
+    /// be real and counts as false all the same. Of a truth without branches nothing changes.
+    #[must_use]
+    pub fn with_class_below_truth(mut self, reference: &[TreeModel]) -> Self {
+        let diameters_m = reference.iter().flat_map(branches).map(|branch| branch.diameter_m());
+        let thinnest_m = diameters_m.fold(f64::INFINITY, f64::min);
+        let classes_m = &mut self.branches.classes_m;
+        if thinnest_m > 0.0 && thinnest_m < classes_m.first().copied().unwrap_or(f64::INFINITY) {
+            classes_m.insert(0, thinnest_m);
+        }
+        self
+    }
+}
+
 /// Matches the models of a plot with its trees by their stems and compares the partners.
 ///
 /// # Errors

@@ -80,6 +80,20 @@ fn truth_against_itself_has_no_error() {
 }
 
 #[test]
+fn branches_thinner_than_the_truth_lists_have_a_class_of_their_own() {
+    let truth = [tree(1, 0.0, TRUE_M, 0.004, 1.0)];
+    let models = [tree(2, 0.0, TRUE_M, 0.003, -1.0)];
+    let params = ModelParams::default().with_class_below_truth(&truth);
+    assert_eq!(params.branches.classes_m, [0.008, 0.02, 0.05, 0.10]);
+    let plot = assess_models(&truth, &models, &params).unwrap();
+    assert_eq!(plot.branches.by_class[0].false_branches, 1);
+    assert_eq!((plot.branches.by_class[1].reference, plot.branches.by_class[1].model), (1, 0));
+    assert!(plot.to_string().contains("\nbelow 0.8 cm "), "{plot}");
+    let thick = [tree(1, 0.0, TRUE_M, 0.03, 1.0)];
+    assert_eq!(ModelParams::default().with_class_below_truth(&thick), ModelParams::default());
+}
+
+#[test]
 fn nothing_at_all() {
     let plot = assess_models(&[], &[], &ModelParams::default()).unwrap();
     assert_eq!(plot.stems.recall(), None);

@@ -128,8 +128,8 @@ impl PlotAccuracy {
             "model m",
             "false m"
         )?;
-        let borders: Vec<String> =
-            self.classes_m.iter().map(|m| format!("{:.0}", 100.0 * m)).collect();
+        let border = |m: &f64| format!("{}", (1000.0 * m).round() / 10.0);
+        let borders: Vec<String> = self.classes_m.iter().map(border).collect();
         for (class, counts) in self.branches.by_class.iter().enumerate() {
             let from = class.checked_sub(1).and_then(|below| borders.get(below));
             let name = match (from, borders.get(class)) {

@@ -49,7 +49,7 @@ pub(super) fn assess(
         models.push(model(&qsm, frame.shift_from(&own)));
     }
     models.retain(|tree| is_high(tree.stem.height_m));
-    let usual = ModelParams::default();
+    let usual = ModelParams::default().with_class_below_truth(&truth);
     let max_distance_m = args.distance.unwrap_or(usual.max_distance_m);
     Ok(assess_models(&truth, &models, &ModelParams { max_distance_m, ..usual })?)
 }

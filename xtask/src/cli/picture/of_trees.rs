@@ -27,7 +27,9 @@ pub(super) fn tree_cloud(heading: &Heading<'_>, path: &Path) -> Result<Canvas> {
 pub(super) fn consolidated(heading: &Heading<'_>, path: &Path) -> Result<Canvas> {
     let (_, Consolidated { consolidation, cloud }) = read::<Consolidated>(path)?;
     if let Some(reason) = consolidation.skipped {
-        return Err(super::super::Usage(format!("there are no consolidated points: {reason}")).into());
+        return Err(
+            super::super::Usage(format!("there are no consolidated points: {reason}")).into()
+        );
     }
     of_points(heading, &cloud, cloud.bounds().min)
 }
