@@ -31,7 +31,7 @@ impl Plot {
         let mut trees =
             vec![of(TreeSpecies::EuropeanBeech, 0.22), of(TreeSpecies::NorwaySpruce, 0.16)];
         trees[0].1 = trees[0].1.leafless();
-        let scan = ScanParams { step_deg: 0.2, ..ScanParams::tls() };
+        let scan = ScanParams { step_deg: 0.3, ..ScanParams::tls() };
         let params = PlotParams { trees, edge_m: 8.0, positions: 3, scan, ..PlotParams::default() };
         assert_eq!(params.origin_m, CORNER_M);
         let scene = plot(5, &params).unwrap();
@@ -117,8 +117,10 @@ fn models_of_two_trees_against_their_truth() {
     let [x, y] = CORNER_M.map(|metres| metres as f64);
     let world = plot.changed("cylinders.csv", "world.csv", |cells| moved(cells, [x, y]));
     assert_eq!(plot.report(&world, &[])["models"]["stems"], models["stems"]);
+    // Rounding moves the places where surfaces are sampled.
     let mean = number(&plot.report(&world, &[]), "/models/surfaces/back/mean_m");
-    assert!((mean - number(models, "/surfaces/back/mean_m")).abs() < 1e-6);
+    let own = number(models, "/surfaces/back/mean_m");
+    assert!((mean - own).abs() < 1e-4, "{mean} {own}");
 
     // A tree that is not there is false, one that is there too is missed.
     let far = plot.changed("trees.csv", "far.csv", |cells| {

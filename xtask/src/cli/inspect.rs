@@ -205,7 +205,7 @@ fn split(value: &Value) -> Vec<(String, Rows)> {
                 ));
             }
             Value::Array(rows) if !rows.is_empty() => columns.push((name, rows)),
-            Value::Object(inner) if name != "frame" && inner.values().any(Value::is_array) => {
+            Value::Object(_) if name != "frame" => {
                 tables.extend(
                     split(field).into_iter().map(|(inner, rows)| (format!("{name}.{inner}"), rows)),
                 );

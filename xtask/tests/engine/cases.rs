@@ -387,7 +387,7 @@ fn inspect_shows_every_kind() {
     let stand = ran_once();
     let expected = |kind: &str| match kind {
         "stems" => ["stems: 2 rows", "base_source=\"LowestPoints\"", "runs: 2 rows"],
-        "tree-cloud" => ["stem: 1 rows", "values: 40 rows", "extra.values: 40 rows"],
+        "tree-cloud" => ["stem: 1 rows", "values: 40 rows", "extra.wood.values: 40 rows"],
         "consolidated" => ["consolidation: 1 rows", "points_left_alone=20", "values: 40 rows"],
         "skeletons" => ["raw.nodes: 2 rows", "consolidated.nodes: 1 rows", "radius_m=0.1"],
         "qsm" => ["metrics: 1 rows", "taper: 1 rows", "source=\"Inferred\""],
