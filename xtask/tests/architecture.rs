@@ -256,8 +256,7 @@ mod architecture {
     #[test]
     fn rule_3_algorithms_touch_no_file() {
         // The other stage crates are about files: `ingest` reads them, `export` and `report` write.
-        let pure =
-            ["ground", "treetops", "segmentation", "crowns", "skeleton", "qsm", "evaluate"];
+        let pure = ["ground", "treetops", "segmentation", "crowns", "skeleton", "qsm", "evaluate"];
         let mut faults = Vec::new();
         for source in algorithms(&pure).iter().filter(|source| !source.path.starts_with(HOOK)) {
             for word in ["fs", "File", "OpenOptions", "PathBuf", "tempfile"] {
