@@ -33,6 +33,7 @@ pub mod vlr;
 mod contain;
 mod decode;
 mod geokeys;
+mod gps_time;
 mod laszip;
 mod observe;
 mod segment;
