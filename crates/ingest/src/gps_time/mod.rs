@@ -11,3 +11,6 @@ mod sequences;
 
 pub(crate) use item::GpsTimes;
 pub(crate) use layer::Point14;
+
+#[cfg(test)]
+mod tests;
