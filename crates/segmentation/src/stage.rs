@@ -23,6 +23,9 @@ impl Params for SegmentationParams {
     }
 }
 
+/// ASPRS classes of noise, low and high.
+const NOISE: [u8; 2] = [7, 18];
+
 const INPUTS: &[InputSpec] = &[
     InputSpec::halo(PointTile::NAME),
     InputSpec::halo(GroundPoints::NAME),
@@ -36,7 +39,7 @@ impl Stage for SegmentationStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "segmentation",
-            version: 3,
+            version: 4,
             summary: "the tree of every point, given the trees: see `method` and `command`",
             unit: UnitKind::Tile,
             inputs: INPUTS,
@@ -153,12 +156,13 @@ fn claims(
     let cloud = &all.cloud;
     // Files that do not count returns say 0.
     let is_first: Vec<bool> = cloud.return_number.iter().map(|number| *number <= 1).collect();
+    let height_m = heights(all);
     let view = View {
         frame: cloud.frame,
         x: &cloud.x,
         y: &cloud.y,
         z: &cloud.z,
-        height_m: &all.height_m,
+        height_m: &height_m,
         is_first: &is_first,
         markers,
     };
@@ -167,6 +171,15 @@ fn claims(
     }
     let own: Vec<bool> = all.own.iter().map(Option::is_some).collect();
     segment_in_blocks(segmenter, &view, &own, params.block_m)
+}
+
+/// Heights above ground, unknown for what the scan says is noise: it has no tree and is no part of
+/// the canopy's surface. Noise is there only where the stage `tiles` was told to keep it.
+fn heights(all: &Surroundings) -> Vec<f32> {
+    let known = all.height_m.iter().zip(&all.cloud.classification);
+    known
+        .map(|(height_m, class)| if NOISE.contains(class) { f32::NAN } else { *height_m })
+        .collect()
 }
 
 fn labels(claims: &[Claim]) -> Labels {

@@ -75,11 +75,22 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
 }
 
 fn run_with(grid: TileGrid, params: &SegmentationParams) -> BTreeMap<[i64; 3], (u64, u32)> {
+    run_on(&points().into_iter().map(|point| (point, 0)).collect::<Vec<_>>(), grid, params)
+}
+
+/// The same with points and classes given.
+fn run_on(
+    points: &[([f64; 3], u8)],
+    grid: TileGrid,
+    params: &SegmentationParams,
+) -> BTreeMap<[i64; 3], (u64, u32)> {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign { grid: Some(grid), ..Campaign::default() });
-    let (points, models) = (points(), models());
+    let models = models();
     let mut whole = PointCloud::default();
-    points.iter().for_each(|p| whole.push_world(*p, &Point::default()));
+    for (world, classification) in points {
+        whole.push_world(*world, &Point { classification: *classification, ..Point::default() });
+    }
     let tiles = store.put_tiles(&whole, grid).unwrap();
     for (tile, cloud, facts) in &tiles {
         let height_m = (0..cloud.len()).map(|i| (cloud.world(i)[2] - CORNER[2]) as f32).collect();
@@ -124,6 +135,26 @@ fn labels_do_not_depend_on_the_tiles() {
         for (edge, origin) in [(16, [0, 0]), (32, [5, 9]), (64, [32, 0])] {
             let tiled = run_with(TileGrid::new(edge, origin).unwrap(), &params);
             assert!(tiled == whole, "{method:?}: tiles of {edge} m");
+        }
+    }
+}
+
+/// As the stage `tiles` leaves it there when told not to drop it.
+#[test]
+fn noise_has_no_tree_and_is_no_canopy() {
+    let grid = TileGrid::new(64, [0, 0]).unwrap();
+    let clean: Vec<_> = points().into_iter().map(|point| (point, 0)).collect();
+    let mut noisy = clean.clone();
+    for (place, ([x, y, z], _)) in clean.iter().enumerate().step_by(37) {
+        noisy.push(([*x, *y, quantise(z + 17.0)], [7, 18][place % 2]));
+    }
+    for method in METHODS {
+        let params = SegmentationParams { method, ..SegmentationParams::default() };
+        let (expected, found) = (run_on(&clean, grid, &params), run_on(&noisy, grid, &params));
+        assert_eq!(found.len(), noisy.len());
+        for (position, label) in found {
+            let other = expected.get(&position).copied().unwrap_or_default();
+            assert_eq!(label, other, "{method:?} at {position:?}");
         }
     }
 }
