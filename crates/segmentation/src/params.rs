@@ -31,6 +31,25 @@ pub enum SegmentMethod {
     Ncut,
 }
 
+impl SegmentMethod {
+    /// All methods, in the sequence of tables.
+    pub const ALL: [Self; 6] =
+        [Self::Starsac, Self::Watershed, Self::Dalponte, Self::Silva, Self::Li, Self::Ncut];
+
+    /// Its name in pipeline files and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starsac => "starsac",
+            Self::Watershed => "watershed",
+            Self::Dalponte => "dalponte",
+            Self::Silva => "silva",
+            Self::Li => "li",
+            Self::Ncut => "ncut",
+        }
+    }
+}
+
 /// Parameters of the stage `segmentation`.
 ///
 /// Those of one method begin with its name; the others hold for several.
@@ -214,6 +233,17 @@ impl SegmentationParams {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_those_of_pipeline_files() {
+        for method in SegmentMethod::ALL {
+            let written = serde_json::to_value(method).unwrap();
+            assert_eq!(written, method.name());
+        }
+        let schema = schemars::schema_for!(SegmentMethod).to_value();
+        let named = schema["oneOf"].as_array().unwrap().len();
+        assert_eq!(named, SegmentMethod::ALL.len(), "every method is listed");
+    }
 
     #[test]
     fn a_radius_beyond_the_reach_is_refused_where_it_counts() {

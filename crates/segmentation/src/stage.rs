@@ -175,9 +175,6 @@ fn claims(
         is_first: &is_first,
         markers,
     };
-    if segmenter.is_local() {
-        return segmenter.segment(&view);
-    }
     let own: Vec<bool> = all.own.iter().map(Option::is_some).collect();
     segment_in_blocks(segmenter, &view, &own, params.block_m)
 }

@@ -11,16 +11,6 @@ use timberline_pointcloud::{Point, PointCloud, TileGrid};
 use timberline_segmentation::stage::SegmentationStage;
 use timberline_segmentation::{SegmentMethod, SegmentationParams};
 
-/// All that the program has built in.
-const METHODS: [SegmentMethod; 6] = [
-    SegmentMethod::Starsac,
-    SegmentMethod::Watershed,
-    SegmentMethod::Dalponte,
-    SegmentMethod::Silva,
-    SegmentMethod::Li,
-    SegmentMethod::Ncut,
-];
-
 const CORNER: [f64; 3] = [500_000.0, 4_200_000.0, 80.0];
 
 /// Echoes on a lattice of 0.7 m in the plane and 1.3 m in height.
@@ -115,7 +105,7 @@ fn run_on(
 
 #[test]
 fn labels_do_not_depend_on_the_tiles() {
-    for method in METHODS {
+    for method in SegmentMethod::ALL {
         // Small blocks and reaches, so that there are several in the row.
         let params = SegmentationParams {
             method,
@@ -148,7 +138,7 @@ fn noise_has_no_tree_and_is_no_canopy() {
     for (place, ([x, y, z], _)) in clean.iter().enumerate().step_by(37) {
         noisy.push(([*x, *y, quantise(z + 17.0)], [7, 18][place % 2]));
     }
-    for method in METHODS {
+    for method in SegmentMethod::ALL {
         let params = SegmentationParams { method, ..SegmentationParams::default() };
         let (expected, found) = (run_on(&clean, grid, &params), run_on(&noisy, grid, &params));
         assert_eq!(found.len(), noisy.len());
@@ -161,7 +151,7 @@ fn noise_has_no_tree_and_is_no_canopy() {
 
 #[test]
 fn labels_do_not_depend_on_threads() {
-    for method in METHODS {
+    for method in SegmentMethod::ALL {
         let params = SegmentationParams { method, block_m: 16, reach_m: 6.0, ..Default::default() };
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
