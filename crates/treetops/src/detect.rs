@@ -122,3 +122,14 @@ fn stands_out(params: &Params, top: &Treetop) -> bool {
     let least = params.min_prominence_m.max(params.min_prominence_ratio * top.height_m);
     top.prominence_m >= least
 }
+
+#[cfg(test)]
+mod tests {
+    use super::MODEL;
+    use crate::evidence::LEN;
+
+    #[test]
+    fn the_model_asks_for_values_that_there_are() {
+        assert!(MODEL.nodes.iter().all(|node| usize::from(node.0) < LEN));
+    }
+}

@@ -162,6 +162,11 @@ mod tests {
     }
 
     #[test]
+    fn the_model_asks_for_values_that_there_are() {
+        assert!(MODEL.nodes.iter().all(|node| usize::from(node.0) < LEN));
+    }
+
+    #[test]
     fn trees_are_the_candidates_from_the_least_score_on() {
         let bump = Candidate { radius_m: 0.5, inliers: 9, ..tree(2, 1.5, 18.0, 0.5) };
         let candidates = Candidates::new(vec![bump, tree(1, 0.0, 20.0, 0.95)], 10.0).unwrap();
