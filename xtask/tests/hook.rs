@@ -42,10 +42,8 @@ impl Stand {
         stand.write("campaign.toml", &campaign);
         let shipped = std::fs::read_to_string(root.join("pipelines/als-inventory.toml")).unwrap();
         let table = format!("[segmentation]\ncommand = {command}\n");
-        let pipeline = match shipped.contains("[segmentation]\n") {
-            true => shipped.replace("[segmentation]\n", &table),
-            false => format!("{shipped}\n{table}"),
-        };
+        let pipeline = shipped.replace("[segmentation]\n", &table);
+        assert_ne!(pipeline, shipped);
         stand.write("pipeline.toml", &pipeline);
         stand
     }

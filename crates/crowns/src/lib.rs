@@ -3,7 +3,7 @@
 //! * [`starsac`]: a surface around every treetop before anything is segmented.
 //! * [`surface`]: the crown's position by an L1 paraboloid over the points of one tree.
 //! * [`footprint`], [`base`], [`edge`]: the crown's outline, its lower end, and whether it is whole.
-//! * [`stage`]: the stages `crown-models` and `crown-fit`.
+//! * [`stage`]: the stages `crown-models`, `detection` and `crown-fit`.
 //!
 //! Everything works on positions relative to a tree's apex, and on grids fixed in the world, so a
 //! crown is the same in whatever tile or frame its points were read.
@@ -29,8 +29,10 @@ pub mod params;
 pub mod stage;
 pub mod starsac;
 pub mod surface;
+pub mod top;
 pub mod window;
 
 pub use error::Error;
 pub use params::{CrownFitParams, CrownModelParams, DetectionParams};
+pub use top::Top;
 pub use window::Window;

@@ -45,6 +45,17 @@ fn the_number_of_threads_changes_nothing() {
 }
 
 #[test]
+fn a_report_names_what_it_compares_and_nothing_else() {
+    let experiment = Experiment { densities_per_m2: vec![3.0], repeats: 1, ..small() };
+    let outcomes = run(&experiment, &quick(), 2);
+    let report = text::markdown(&experiment, &pooled(&outcomes));
+    let named: Vec<&str> = report.lines().filter(|line| line.starts_with("* `")).collect();
+    assert_eq!(named.len(), 2, "{named:?}");
+    assert!(named[0].starts_with("* `starsac`") && named[1].starts_with("* `watershed`"));
+    assert!(report.contains("scanned 15 m further in stands that reach 27 m further"), "{report}");
+}
+
+#[test]
 fn tables_are_whole_and_figures_sensible() {
     let experiment = small();
     let outcomes = run(&experiment, &quick(), 2);

@@ -68,6 +68,17 @@ impl SortedTrees {
         Ok(())
     }
 
+    /// Whether a tree is there.
+    ///
+    /// # Errors
+    /// [`Error::Sqlite`].
+    pub fn contains(&self, id: u64) -> Result<bool, Error> {
+        let fail = Error::sqlite(&self.path);
+        let mut select =
+            self.connection.prepare_cached("SELECT 1 FROM trees WHERE id = ?1").map_err(&fail)?;
+        select.exists(params![id as i64]).map_err(&fail)
+    }
+
     /// Calls `visit` with an iterator over all trees, by ascending id.
     ///
     /// # Errors
@@ -111,6 +122,7 @@ mod tests {
         assert_eq!(found.iter().map(|tree| tree.id).collect::<Vec<_>>(), [3, 5, 9]);
         assert!(found[0].ground_m.is_nan());
         assert_eq!(found[2].crown_m, [[9.0, 0.1]]);
+        assert_eq!([0, 3, 4, 9].map(|id| trees.contains(id).unwrap()), [false, true, false, true]);
     }
 
     #[test]

@@ -109,7 +109,7 @@ impl Stage for ExportStage {
     fn info() -> StageInfo {
         StageInfo {
             name: NAME,
-            version: 3,
+            version: 4,
             summary: "tables, GIS layers, rasters and classified points of the whole campaign",
             unit: UnitKind::Campaign,
             inputs: INPUTS,

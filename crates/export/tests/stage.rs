@@ -4,9 +4,9 @@
 
 mod scene;
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
-use timberline_artefact::kinds::Outputs;
+use timberline_artefact::kinds::{Labels, Outputs, Trees};
 use timberline_artefact::{Kind, UnitId};
 use timberline_export::stage::{ExportStage, Params};
 
@@ -104,4 +104,38 @@ fn how_the_campaign_is_cut_does_not_matter() {
     for name in ["chm.tif", "dtm.tif", "trees.csv", "trees.gpkg"] {
         assert!(shifted[name] == reference[name], "{name} differs");
     }
+}
+
+/// A stage that fails on a tile loses its trees; the tiles around it keep theirs.
+#[test]
+fn no_point_names_a_tree_that_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut alone = scene::campaign(folder.path(), 32, [0, 0], 1);
+    let with_trees: Vec<UnitId> =
+        alone.files.iter().filter(|f| f.kind == Trees::NAME).map(|f| f.unit.clone()).collect();
+    let lost = with_trees[with_trees.len() / 2].clone();
+    let Trees { trees } = alone.read(lost.clone()).unwrap();
+    let gone: BTreeSet<u64> = trees.iter().map(|tree| tree.id).collect();
+    let named = |unit: &UnitId| {
+        let Labels { tree_id, .. } = alone.read(unit.clone()).unwrap();
+        tree_id.iter().filter(|id| gone.contains(id)).count()
+    };
+    let around: usize = with_trees.iter().filter(|unit| **unit != lost).map(named).sum();
+    assert!(around > 0, "no other tile has points of its trees");
+
+    alone.files.retain(|file| file.kind != Trees::NAME || file.unit != lost);
+    alone.run::<ExportStage>(UnitId::Campaign, None, &Params::default()).unwrap();
+    let table = std::fs::read_to_string(alone.outputs().join("trees.csv")).unwrap();
+    let told: BTreeSet<u64> =
+        table.lines().skip(1).map(|row| row.split(',').next().unwrap().parse().unwrap()).collect();
+    assert!(told.len() < 49 && told.is_disjoint(&gone));
+    let mut reader = las::Reader::from_path(alone.outputs().join("points.laz")).unwrap();
+    let points = reader.read_all().unwrap();
+    let tree = |point: las::Result<las::Point>| {
+        // After the height above ground, 4 bytes.
+        f64::from_le_bytes(point.unwrap().extra_bytes[4..12].try_into().unwrap()) as u64
+    };
+    let mut found: BTreeSet<u64> = points.points().map(tree).collect();
+    assert!(found.remove(&0));
+    assert_eq!(found, told);
 }

@@ -5,10 +5,12 @@
 //! variable), two `i64` of special records, number of items `u16`, items of type, size, version.
 
 use crate::contain::contained;
+use crate::gps_time::{GpsTimes, Point14};
 use crate::header::Header;
 use crate::source::Source;
 use crate::vlr::RecordData;
 use crate::{Error, Notes};
+use laz::las::{v3, v4};
 use laz::laszip::ChunkTable;
 use laz::record::{
     LayeredPointRecordDecompressor, RecordDecompressor, SequentialPointRecordDecompressor,
@@ -49,7 +51,25 @@ pub(crate) struct Laszip {
 }
 
 /// A decompressor of one run of points.
-pub(crate) type Decompressor<R> = Box<dyn RecordDecompressor<R> + Send + Sync>;
+pub(crate) enum Decompressor<R: Read + Seek> {
+    /// Items that follow one another for every point.
+    Items(SequentialPointRecordDecompressor<'static, R>),
+    /// Layers.
+    Layers(LayeredPointRecordDecompressor<'static, R>),
+}
+
+impl<R: Read + Seek> Decompressor<R> {
+    /// Decompresses the next record.
+    ///
+    /// # Errors
+    /// What the `laz` crate refuses.
+    pub(crate) fn next(&mut self, record: &mut [u8]) -> std::io::Result<()> {
+        match self {
+            Self::Items(items) => items.decompress_next(record),
+            Self::Layers(layers) => layers.decompress_next(record),
+        }
+    }
+}
 
 fn refuse(data: &RecordData, problem: impl Into<String>) -> Error {
     Error::Record {
@@ -222,26 +242,68 @@ impl Laszip {
     where
         R: Read + Seek + Send + Sync + 'static,
     {
-        let mut decompressor: Decompressor<R> = if self.layered {
-            Box::new(LayeredPointRecordDecompressor::new(input))
-        } else {
-            Box::new(SequentialPointRecordDecompressor::new(input))
-        };
-        self.set_fields(&mut decompressor)?;
-        Ok(decompressor)
+        if self.layered {
+            let mut layers = LayeredPointRecordDecompressor::new(input);
+            self.add_layers(&mut layers)?;
+            return Ok(Decompressor::Layers(layers));
+        }
+        let mut items = SequentialPointRecordDecompressor::new(input);
+        self.add_items(&mut items)?;
+        Ok(Decompressor::Items(items))
     }
 
     /// Brings a decompressor to the beginning of the next chunk of its stream.
     ///
     /// # Errors
     /// As [`Self::decompressor`].
-    pub(crate) fn restart<R>(&self, decompressor: &mut Decompressor<R>) -> Result<(), String> {
-        decompressor.reset();
-        self.set_fields(decompressor)
+    pub(crate) fn restart<R>(&self, decompressor: &mut Decompressor<R>) -> Result<(), String>
+    where
+        R: Read + Seek + Send + Sync + 'static,
+    {
+        match decompressor {
+            Decompressor::Items(items) => {
+                items.reset();
+                self.add_items(items)
+            }
+            Decompressor::Layers(layers) => {
+                layers.reset();
+                self.add_layers(layers)
+            }
+        }
     }
 
-    fn set_fields<R>(&self, decompressor: &mut Decompressor<R>) -> Result<(), String> {
-        decompressor.set_fields_from(self.vlr.items()).map_err(|error| error.to_string())?;
+    fn add_items<R>(
+        &self,
+        decompressor: &mut SequentialPointRecordDecompressor<'static, R>,
+    ) -> Result<(), String>
+    where
+        R: Read + 'static,
+    {
+        for item in self.vlr.items() {
+            match (item.item_type(), item.version()) {
+                (LazItemType::GpsTime, 2) => decompressor.add_field_decompressor(GpsTimes::new()),
+                _ => decompressor.set_fields_from(&vec![*item]).map_err(|e| e.to_string())?,
+            }
+        }
+        Ok(())
+    }
+
+    fn add_layers<R>(
+        &self,
+        decompressor: &mut LayeredPointRecordDecompressor<'static, R>,
+    ) -> Result<(), String>
+    where
+        R: Read + Seek + 'static,
+    {
+        for item in self.vlr.items() {
+            match (item.item_type(), item.version()) {
+                (LazItemType::Point14, 3) => decompressor
+                    .add_field_decompressor(Point14::new(v3::LasPoint6Decompressor::default())),
+                (LazItemType::Point14, 4) => decompressor
+                    .add_field_decompressor(Point14::new(v4::LasPoint6Decompressor::default())),
+                _ => decompressor.set_fields_from(&vec![*item]).map_err(|e| e.to_string())?,
+            }
+        }
         decompressor.set_selection(DecompressionSelection::all());
         Ok(())
     }

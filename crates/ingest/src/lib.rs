@@ -42,6 +42,7 @@ mod damages;
 mod decode;
 mod e57;
 mod geokeys;
+mod gps_time;
 mod laszip;
 mod marking;
 mod observe;

@@ -7,7 +7,7 @@ use crate::source::Source;
 use crate::vlr::Records;
 use crate::{Error, Notes};
 use rayon::prelude::*;
-use std::io::{BufReader, Cursor, SeekFrom};
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 
 /// Bytes of records in a batch: about half a million points, ten LAZ chunks of the usual 50,000.
 const BATCH_BYTES: u64 = 1 << 24;
@@ -313,11 +313,15 @@ fn decompress_all(
 }
 
 /// Fills `out` with records; a failure or panic ends the run.
-fn decompress<R>(input: &mut Decompressor<R>, out: &mut [u8], record_len: u16) -> Done {
+fn decompress<R: Read + Seek>(
+    input: &mut Decompressor<R>,
+    out: &mut [u8],
+    record_len: u16,
+) -> Done {
     let mut points = 0;
     let result = contained(|| {
         for record in out.chunks_exact_mut(usize::from(record_len)) {
-            input.decompress_next(record)?;
+            input.next(record)?;
             points += 1;
         }
         Ok(())

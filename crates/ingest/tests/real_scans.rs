@@ -93,3 +93,39 @@ fn tiles_of_three_scans_hold_all_their_points() {
     let given: u64 = facts.iter().map(|f| f.points).sum();
     assert_eq!(kept + dropped.iter().sum::<u64>(), given);
 }
+
+/// GPS times are decoded here and not by the `laz` crate, and with them the returns they depend on.
+#[test]
+#[ignore = "needs TIMBERLINE_DATA"]
+fn what_is_decoded_is_what_the_laz_crate_decodes() {
+    for name in [
+        "als/lasR_bcts/bcts_1.laz",
+        "formats/laspy/data/autzen_trim.laz",
+        "als/spanner/UAS_Clip.laz",
+        "formats/PDAL/laz/las_with_several_extra_byte_bloc.laz",
+        "uas_treeclips/Plot_8_Tree_28.laz",
+    ] {
+        let path = data_root().join(name);
+        let mut ours = Vec::new();
+        let mut file = LasFile::open(&path, UnitChoice::default(), None).unwrap();
+        while let Some(cloud) = file.next_batch().unwrap() {
+            ours.extend((0..cloud.len()).map(|index| {
+                let point = cloud.point(index);
+                let returns = [point.return_number, point.number_of_returns];
+                (point.gps_time.to_bits(), returns, point.intensity)
+            }));
+        }
+        let mut reader = las::Reader::from_path(&path).unwrap();
+        let theirs = reader.read_all().unwrap();
+        let theirs = theirs.points().map(|point| {
+            let point = point.unwrap();
+            let returns = [point.return_number, point.number_of_returns];
+            (point.gps_time.unwrap().to_bits(), returns, point.intensity)
+        });
+        let theirs: Vec<_> = theirs.collect();
+        let times: std::collections::BTreeSet<u64> = theirs.iter().map(|point| point.0).collect();
+        println!("{name}: {} points, {} times", theirs.len(), times.len());
+        assert!(times.len() > 1000, "{name} has few times");
+        assert!(ours == theirs, "{name}");
+    }
+}

@@ -50,7 +50,7 @@ fn models(criterion: &mut Criterion) {
         let (points, skeleton) = tree(count);
         group.throughput(Throughput::Elements(count as u64));
         group.bench_function(BenchmarkId::from_parameter(count), |bench| {
-            let given = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3] };
+            let given = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3], dbh_m: None };
             bench.iter(|| model_tree(black_box(&given), &skeleton, &Params::default()));
         });
     }

@@ -2,6 +2,7 @@
 
 use crate::assign::assign;
 use crate::axis::{Joints, moved, rebuilt};
+use crate::bound::Bound;
 use crate::branches::{Branch, split};
 use crate::measure::{Measured, Owned, measure, noise_of, noise_of_stem};
 use crate::pipe::PipeModel;
@@ -32,12 +33,20 @@ pub struct Built {
 ///
 /// # Errors
 /// What is wrong with the skeleton.
-pub fn build(points: &Points, skeleton: &[SkeletonNode], params: &Params) -> Result<Built, Error> {
-    let branches = split(skeleton)?;
-    Ok(match params.method {
-        Method::Adtree => unfitted(points, &branches, params),
-        Method::Fitted => fitted(points, branches, params),
-    })
+pub fn build(
+    points: &Points,
+    skeleton: &[SkeletonNode],
+    bound: Option<&Bound>,
+    params: &Params,
+) -> Result<Built, Error> {
+    if params.method == Method::Adtree {
+        return Ok(unfitted(points, &split(skeleton)?, params));
+    }
+    let branches = match bound {
+        Some(bound) => split(&bound.kept(skeleton))?,
+        None => split(skeleton)?,
+    };
+    Ok(fitted(points, branches, bound, params))
 }
 
 /// The skeleton's segments with its radii.
@@ -83,12 +92,18 @@ struct Pass {
 }
 
 /// Cuts, assigns, fits, and finds radii and axes.
-fn pass(points: &Points, branches: &[Branch], noise_m: Option<f64>, params: &Params) -> Pass {
+fn pass(
+    points: &Points,
+    branches: &[Branch],
+    noise_m: Option<f64>,
+    bound: Option<&Bound>,
+    params: &Params,
+) -> Pass {
     let sections = cut(branches, params);
     let owner = assign(&points.points_m, &sections.all);
     let owned = Owned::new(&points.points_m, points.wood.as_deref(), &owner, sections.all.len());
     let noise_m = noise_of_stem(&sections, &owned, params).or(noise_m);
-    let measured = measure(&sections, &owned, noise_m, params);
+    let measured = bounded(measure(&sections, &owned, noise_m, params), bound);
     let own_noise = noise_m.or_else(|| noise_of(&measured));
     let noise = own_noise.unwrap_or(params.noise_m);
     let given = Given { branches, sections: &sections, measured: &measured, noise_m: noise };
@@ -97,17 +112,24 @@ fn pass(points: &Points, branches: &[Branch], noise_m: Option<f64>, params: &Par
     Pass { sections, owner, measured, radii, joints, noise_m: own_noise, pipe }
 }
 
+/// Leaves out fits of what is too thick for the tree: foliage around an axis.
+fn bounded(measured: Vec<Option<Measured>>, bound: Option<&Bound>) -> Vec<Option<Measured>> {
+    let Some(bound) = bound else { return measured };
+    let fits = |one: &Measured| one.fit.radius_m <= bound.at(one.view.origin_m[2]);
+    measured.into_iter().map(|one| one.filter(fits)).collect()
+}
+
 /// Two passes: the first finds how thick branches are, whatever the skeleton says; the second fits
 /// sections of the right length along the corrected axes.
-fn fitted(points: &Points, branches: Vec<Branch>, params: &Params) -> Built {
+fn fitted(points: &Points, branches: Vec<Branch>, bound: Option<&Bound>, params: &Params) -> Built {
     let thinned = points.thinned(FIRST_PASS_POINTS);
-    let first = pass(&thinned, &branches, None, params);
+    let first = pass(&thinned, &branches, None, bound, params);
     let noise = first.noise_m.unwrap_or(params.noise_m);
     let branches = rebuilt(&branches, &first.joints, &first.sections, &first.radii);
     let mut branches = pruned(branches.clone(), &cut(&branches, params), noise);
     let sections = cut(&branches, params);
     begin(&mut branches, &sections, noise);
-    let second = pass(points, &branches, first.noise_m, params);
+    let second = pass(points, &branches, first.noise_m, bound, params);
     let Pass { sections, owner, measured, radii, joints, noise_m, pipe } = second;
     let (model, cylinder_of) = model(&branches, &sections, &joints, &radii, &measured);
     let owner = owner.iter().map(|section| cylinder_of[*section as usize]).collect();

@@ -1,5 +1,6 @@
 //! One tree from one skeleton, or from the better of two.
 
+use crate::bound::Bound;
 use crate::build::{Built, build};
 use crate::distances::{cloud_to_model, model_to_cloud, unseen_cylinders};
 use crate::measure::Owned;
@@ -32,7 +33,7 @@ pub fn model_tree(
     params: &Params,
 ) -> Result<ModelledTree, Error> {
     check(params)?;
-    modelled(&Points::new(tree)?, tree.base_m, skeleton, params)
+    modelled(&Points::new(tree)?, tree, skeleton, params)
 }
 
 /// Models a tree along the skeleton from the points as scanned and, where there is one, along that
@@ -49,7 +50,7 @@ pub fn choose(
 ) -> Result<Choice, Error> {
     check(params)?;
     let points = Points::new(tree)?;
-    let from_raw = modelled(&points, tree.base_m, raw, params)?;
+    let from_raw = modelled(&points, tree, raw, params)?;
     let raw_mean_m = from_raw.cloud_to_model.mean_m;
     let kept = |reason: String, consolidated_mean_m: f64, tree: ModelledTree| Choice {
         tree,
@@ -61,7 +62,7 @@ pub fn choose(
     let Some(consolidated) = consolidated else {
         return Ok(kept("there is no consolidated skeleton".to_owned(), f64::NAN, from_raw));
     };
-    let other = match modelled(&points, tree.base_m, consolidated, params) {
+    let other = match modelled(&points, tree, consolidated, params) {
         Ok(other) => other,
         Err(error) => return Ok(kept(format!("consolidated: {error}"), f64::NAN, from_raw)),
     };
@@ -87,14 +88,15 @@ fn check(params: &Params) -> Result<(), Error> {
 
 fn modelled(
     points: &Points,
-    base_m: [f64; 3],
+    tree: &TreePoints<'_>,
     skeleton: &[SkeletonNode],
     params: &Params,
 ) -> Result<ModelledTree, Error> {
-    let Built { model, owner, noise_m, pipe } = build(points, skeleton, params)?;
+    let bound = Bound::of(tree, params.breast_height_m);
+    let Built { model, owner, noise_m, pipe } = build(points, skeleton, bound.as_ref(), params)?;
     let wood = points.wood.as_deref();
     let owned = Owned::new(&points.points_m, wood, &owner, model.cylinders.len());
-    let metrics = metrics(&model, &points.points_m, &owned, base_m, noise_m, params);
+    let metrics = metrics(&model, &points.points_m, &owned, tree.base_m, noise_m, params);
     Ok(ModelledTree {
         cloud_to_model: cloud_to_model(&points.points_m, &model),
         model_to_cloud: model_to_cloud(&points.points_m, &owner, &model)?,

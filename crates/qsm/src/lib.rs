@@ -19,7 +19,7 @@
 //!     .collect();
 //! let node = |z, parent| SkeletonNode { position_m: [0.03, 0.0, z], parent, radius_m: 0.2 };
 //! let skeleton = [node(0.0, None), node(1.5, Some(0)), node(3.0, Some(1))];
-//! let tree = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3] };
+//! let tree = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3], dbh_m: None };
 //! let found = model_tree(&tree, &skeleton, &Params::default())?;
 //! let dbh = found.metrics.dbh.ok_or("no diameter")?;
 //! assert!((dbh.diameter_m - 0.2).abs() < 0.004);
@@ -28,6 +28,7 @@
 
 pub mod assign;
 pub mod axis;
+pub mod bound;
 pub mod branches;
 pub mod build;
 pub mod choice;

@@ -22,6 +22,9 @@ pub struct TreePoints<'a> {
     pub wood: Option<&'a [f32]>,
     /// Where the axis of the stem meets the ground, local frame, m.
     pub base_m: [f64; 3],
+    /// Diameter at breast height by what found the stem, m, if it was seen: nothing above is much
+    /// thicker. It is no part of the result.
+    pub dbh_m: Option<f64>,
 }
 
 /// What a radius rests on.

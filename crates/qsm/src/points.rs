@@ -92,7 +92,8 @@ mod tests {
             vec![[0.3, 0.125, 1.0], [f64::NAN, 0.0, 0.0], [0.2, 0.1, 1.0], [0.2, 0.1, 1.0]];
         let mut wood = vec![0.1, 0.2, 0.9, 0.4];
         let sorted = |points: &[[f64; 3]], wood: &[f32]| {
-            let tree = TreePoints { points_m: points, wood: Some(wood), base_m: [0.0; 3] };
+            let tree =
+                TreePoints { points_m: points, wood: Some(wood), base_m: [0.0; 3], dbh_m: None };
             Points::new(&tree).unwrap()
         };
         let one = sorted(&points, &wood);
@@ -101,7 +102,8 @@ mod tests {
         assert_eq!(sorted(&points, &wood), one);
         assert_eq!((one.not_finite, one.points_m.len()), (1, 3));
         assert_eq!(one.wood.as_deref(), Some(&[0.4, 0.9, 0.1][..]));
-        let short = TreePoints { points_m: &points, wood: Some(&wood[1..]), base_m: [0.0; 3] };
+        let short =
+            TreePoints { points_m: &points, wood: Some(&wood[1..]), base_m: [0.0; 3], dbh_m: None };
         assert_eq!(Points::new(&short), Err(Error::Length { points: 4, found: 3 }));
     }
 }

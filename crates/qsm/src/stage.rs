@@ -56,6 +56,7 @@ impl Stage for CylindersStage {
             points_m: &positions,
             wood: wood.as_deref(),
             base_m: cloud.frame.local_from_world(stem.base_m),
+            dbh_m: Some(stem.dbh_m),
         };
         let raw = nodes(&skeletons.raw);
         let other = skeletons.consolidated.as_ref().map(nodes);

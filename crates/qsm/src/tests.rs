@@ -47,7 +47,7 @@ impl Scene {
     }
 
     fn tree(&self) -> TreePoints<'_> {
-        TreePoints { points_m: &self.points, wood: None, base_m: [0.0; 3] }
+        TreePoints { points_m: &self.points, wood: None, base_m: [0.0; 3], dbh_m: None }
     }
 }
 
@@ -145,7 +145,7 @@ fn order_threads_and_whole_metres_change_nothing() {
         .iter()
         .map(|node| SkeletonNode { position_m: moved(node.position_m), ..*node })
         .collect();
-    let tree = TreePoints { points_m: &points, wood: None, base_m: by };
+    let tree = TreePoints { points_m: &points, wood: None, base_m: by, dbh_m: None };
     let other = model_tree(&tree, &skeleton, &Params::default()).unwrap();
     let (a, b) = (one.metrics.dbh.unwrap(), other.metrics.dbh.unwrap());
     assert!((a.diameter_m - b.diameter_m).abs() < 1e-3);
@@ -206,7 +206,7 @@ mod bad_input {
     }
 
     fn model(points: &[[f64; 3]]) -> ModelledTree {
-        let tree = TreePoints { points_m: points, wood: None, base_m: [0.0; 3] };
+        let tree = TreePoints { points_m: points, wood: None, base_m: [0.0; 3], dbh_m: None };
         model_tree(&tree, &post(), &Params::default()).unwrap()
     }
 
@@ -267,7 +267,8 @@ mod bad_input {
     #[test]
     fn faults_of_the_caller_are_errors() {
         let points = [[0.0; 3]; 4];
-        let tree = TreePoints { points_m: &points, wood: Some(&[1.0; 3]), base_m: [0.0; 3] };
+        let tree =
+            TreePoints { points_m: &points, wood: Some(&[1.0; 3]), base_m: [0.0; 3], dbh_m: None };
         let error = model_tree(&tree, &post(), &Params::default()).unwrap_err();
         assert_eq!(error.to_string(), "`wood` has 3 values for 4 points");
         let params = Params { min_section_m: 2.0, ..Params::default() };

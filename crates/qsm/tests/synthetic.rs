@@ -80,7 +80,7 @@ fn case(species: TreeSpecies, dbh_m: f64, leaves: bool, scan: &ScanParams, seed:
             std::array::from_fn(|k| world[k] - origin[k])
         })
         .collect();
-    let given = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3] };
+    let given = TreePoints { points_m: &points, wood: None, base_m: [0.0; 3], dbh_m: None };
     let found = model_tree(&given, &skeleton(&tree, origin), &Params::default()).unwrap();
     let leafy = if leaves { "leaves" } else { "bare" };
     let name = format!("{} {dbh_m} {leafy}, {} points", species.code(), points.len());

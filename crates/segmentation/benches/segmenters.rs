@@ -24,15 +24,6 @@ use timberline_segmentation::{
     Claim, SegmentMethod, SegmentationParams, Segmenter, View, segment_in_blocks, segmenter,
 };
 
-const METHODS: [(&str, SegmentMethod); 6] = [
-    ("starsac", SegmentMethod::Starsac),
-    ("watershed", SegmentMethod::Watershed),
-    ("dalponte", SegmentMethod::Dalponte),
-    ("silva", SegmentMethod::Silva),
-    ("li", SegmentMethod::Li),
-    ("ncut", SegmentMethod::Ncut),
-];
-
 const SIZES: [u64; 4] = [250_000, 500_000, 1_000_000, 2_000_000];
 
 fn main() {
@@ -46,7 +37,8 @@ fn main() {
     for size in SIZES.into_iter().filter(|size| *size <= most.unwrap_or(u64::MAX)) {
         let stand = stand::stand(size, 4);
         let view = stand.piece.view();
-        for (name, method) in METHODS {
+        for method in SegmentMethod::ALL {
+            let name = method.name();
             if named.is_empty() || named.iter().any(|n| *n == name) {
                 let params = SegmentationParams { method, ..SegmentationParams::default() };
                 let runs = if size > 500_000 { 1 } else { 3 };
@@ -76,11 +68,7 @@ fn right(stand: &Stand, claims: &[Claim]) -> f64 {
 
 fn timed(segmenter: &dyn Segmenter, view: &View<'_>, block_m: u32) -> (Duration, Vec<Claim>) {
     let (wall, before) = (Instant::now(), cpu_time());
-    let claims = if segmenter.is_local() {
-        segmenter.segment(view)
-    } else {
-        segment_in_blocks(segmenter, view, &vec![true; view.len()], block_m)
-    };
+    let claims = segment_in_blocks(segmenter, view, &vec![true; view.len()], block_m);
     let used = match (before, cpu_time()) {
         (Some(before), Some(after)) => after - before,
         _ => wall.elapsed(),

@@ -15,7 +15,8 @@ use timberline_pointcloud::{Frame, Grid2, Rect};
 /// A square of the world: column and row, counted in edges from the origin.
 type Block = [i64; 2];
 
-/// The tree of every `wanted` point, square by square; nothing for the others.
+/// The tree of every `wanted` point, square by square; nothing for the others. A segmenter that is
+/// [`local`](Segmenter::is_local) needs no squares and is asked once for all.
 ///
 /// `block_m` is the squares' edge in whole metres, at least 1. The view must hold all points and
 /// trees within the segmenter's reach of every square with a wanted point: see [`room_m`].
@@ -30,7 +31,10 @@ pub fn segment_in_blocks(
     block_m: u32,
 ) -> Result<Vec<Claim>, Error> {
     view.check()?;
-    same_length("wanted", view.len(), wanted.len())?;
+    Error::check_lengths(view.len(), &[("wanted", wanted.len())])?;
+    if segmenter.is_local() {
+        return segmented_whole(segmenter, view, wanted);
+    }
     let grid = Grid2::new(view.x, view.y, SEARCH_CELL_M)?;
     let blocks: Vec<(Block, Vec<u32>)> =
         wanted_by_block(view, wanted, block_m).into_iter().collect();
@@ -41,7 +45,7 @@ pub fn segment_in_blocks(
             let near = near(view, &grid, &rect.grown(segmenter.reach_m()));
             let piece = cut(view, &near, &rect, segmenter.reach_m());
             let claims = segmenter.segment(&piece.view())?;
-            same_length("claims", near.len(), claims.len())?;
+            Error::check_lengths(near.len(), &[("claims", claims.len())])?;
             Ok(own_claims(own, &near, &claims))
         })
         .collect();
@@ -67,8 +71,17 @@ pub fn room_m(tile: &Rect, block_m: u32, reach_m: f64) -> f64 {
 /// Edge of the search grid's cells, m.
 const SEARCH_CELL_M: f64 = 8.0;
 
-fn same_length(column: &'static str, expected: usize, found: usize) -> Result<(), Error> {
-    if expected == found { Ok(()) } else { Err(Error::Length { column, expected, found }) }
+/// What a local segmenter says of the wanted points: no squares are needed.
+fn segmented_whole(
+    segmenter: &dyn Segmenter,
+    view: &View<'_>,
+    wanted: &[bool],
+) -> Result<Vec<Claim>, Error> {
+    let mut claims = segmenter.segment(view)?;
+    Error::check_lengths(view.len(), &[("claims", claims.len())])?;
+    let unwanted = claims.iter_mut().zip(wanted).filter(|(_, wanted)| !**wanted);
+    unwanted.for_each(|(claim, _)| *claim = Claim::default());
+    Ok(claims)
 }
 
 /// The wanted points of every square that has any.
@@ -282,6 +295,37 @@ mod tests {
             prop_assert!(expected.iter().all(|claim| claim.id != 0));
             prop_assert_eq!(&in_tiles(&points, tile_m, shift % tile_m, block_m, reach_m), &expected);
         }
+    }
+
+    /// Says for every point how many it was shown.
+    struct Count {
+        is_local: bool,
+    }
+
+    impl Segmenter for Count {
+        fn reach_m(&self) -> f64 {
+            1.0
+        }
+
+        fn is_local(&self) -> bool {
+            self.is_local
+        }
+
+        fn segment(&self, view: &View<'_>) -> Result<Vec<Claim>, Error> {
+            Ok(vec![Claim { id: view.len() as u64, score: 0.5 }; view.len()])
+        }
+    }
+
+    #[test]
+    fn local_segmenters_are_asked_once_and_for_wanted_points_only() {
+        let rect = Rect { min: [-99.0; 2], max: [99.0; 2] };
+        let (_, piece) = piece(&[(0, 0, 0), (10, 10, 0), (800, 800, 0)], &rect, Frame::default());
+        let ids = |is_local| {
+            let wanted = [true, false, true];
+            let claims = segment_in_blocks(&Count { is_local }, &piece.view(), &wanted, 8).unwrap();
+            claims.iter().map(|claim| claim.id).collect::<Vec<u64>>()
+        };
+        assert_eq!((ids(true), ids(false)), (vec![3, 0, 3], vec![2, 0, 1]));
     }
 
     #[test]

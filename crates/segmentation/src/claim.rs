@@ -83,18 +83,14 @@ pub fn label(
     crowns: &[Crown],
     params: &SegmentationParams,
 ) -> Result<Vec<Claim>, Error> {
-    let expected = x.len();
-    for (column, found) in [("y", y.len()), ("z", z.len()), ("height", height_m.len())] {
-        if found != expected {
-            return Err(Error::Length { column, expected, found });
-        }
-    }
+    let columns = [("y", y.len()), ("z", z.len()), ("height", height_m.len())];
+    Error::check_lengths(x.len(), &columns)?;
     let reach_m = params.reach_m;
     if let Some(far) = crowns.iter().find(|crown| crown.radius_m > reach_m) {
         return Err(Error::Reach { tree: far.id, radius_m: far.radius_m, reach_m });
     }
     let grid = Grid2::new(x, y, GRID_CELL_M)?;
-    let mut claims = vec![Claim::default(); expected];
+    let mut claims = vec![Claim::default(); x.len()];
     for crown in crowns {
         grid.candidates(crown.apex[0], crown.apex[1], crown.radius_m, |i| {
             if f64::from(height_m[i]) >= params.min_height_m

@@ -6,10 +6,12 @@
 //! around a point, and nothing else; the others work in squares fixed in the world ([`blocks`]).
 //! A program of the user's can take their place ([`hook`]).
 //!
-//! What users of a tree id expect, and get: a point of the ground, of herbs and shrubs below
-//! `min_height_m`, and of everything above or beyond the crowns has 0; a point of the canopy has
-//! the tree whose surface it lies on, also where crowns touch; a point below the canopy (inner
-//! branches, stems, understorey without a top of its own) has the tree above it.
+//! What a tree id means: points of the ground, of herbs and shrubs below `min_height_m`, and those
+//! beyond all crowns have 0; a point of the canopy has the tree whose surface it lies on, also where
+//! crowns touch; a point below the canopy (inner branches, stems, understorey without a top of its
+//! own) has the tree above it, unless `membership = "surface"` leaves it out. A point above the crowns
+//! has none by crown models, and by the other methods the tree it stands out of. A program decides
+//! for itself, within the reach of a tree.
 
 pub mod blocks;
 pub mod chm;

@@ -35,6 +35,25 @@ pub enum SegmentMethod {
     Ncut,
 }
 
+impl SegmentMethod {
+    /// All methods, in the sequence of tables.
+    pub const ALL: [Self; 6] =
+        [Self::Starsac, Self::Watershed, Self::Dalponte, Self::Silva, Self::Li, Self::Ncut];
+
+    /// Its name in pipeline files and tables.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Starsac => "starsac",
+            Self::Watershed => "watershed",
+            Self::Dalponte => "dalponte",
+            Self::Silva => "silva",
+            Self::Li => "li",
+            Self::Ncut => "ncut",
+        }
+    }
+}
+
 /// Parameters of the stage `segmentation`.
 ///
 /// Those of one method begin with its name; the others hold for several.
@@ -58,8 +77,8 @@ pub struct SegmentationParams {
     /// Points lower than this above the ground belong to no tree.
     #[schemars(range(min = 0.0, max = 30.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub min_height_m: f64,
-    /// For `starsac` with `membership = "volume"`: points up to this far above the
-    /// surface still belong, for crowns are rougher than their models.
+    /// With `membership = "volume"`, for `starsac` and trees below the canopy with other methods:
+    /// points up to this far above the crown model still belong, for crowns are rougher than it.
     #[schemars(range(min = 0.0, max = 20.0), extend("x-unit" = "m", "x-source" = "this program"))]
     pub above_m: f64,
     /// Edge of the cells of the canopy height model.
@@ -108,22 +127,22 @@ pub struct SegmentationParams {
     #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "this program: as raster_radius_m"))]
     pub li_radius_m: f64,
     /// For `ncut`: edge of the voxels in the plane.
-    #[schemars(range(min = 0.2, max = 5.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.2, max = 5.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: this program, set on simulated stands"))]
     pub ncut_voxel_m: f64,
     /// For `ncut`: height of the voxels.
-    #[schemars(range(min = 0.2, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.2, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009: 0.5 m; value: this program, set on simulated stands"))]
     pub ncut_voxel_height_m: f64,
     /// For `ncut`: voxels further apart in the plane are not compared.
-    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.5, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: this program, set on simulated stands"))]
     pub ncut_radius_m: f64,
     /// For `ncut`: scale on which the likeness of voxels falls off in the plane.
-    #[schemars(range(min = 0.1, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.1, max = 20.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: this program, set on simulated stands"))]
     pub ncut_sigma_xy_m: f64,
     /// For `ncut`: scale on which it falls off in height.
-    #[schemars(range(min = 0.1, max = 100.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.1, max = 100.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: this program, set on simulated stands"))]
     pub ncut_sigma_z_m: f64,
     /// For `ncut`: scale on which it falls off with the distance from the nearest treetop.
-    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: measured on simulated stands"))]
+    #[schemars(range(min = 0.1, max = 50.0), extend("x-unit" = "m", "x-source" = "Reitberger et al. 2009, for the principle; value: this program, set on simulated stands"))]
     pub ncut_sigma_top_m: f64,
     /// For `ncut`: a cut with a larger normalised value is not made.
     #[schemars(range(min = 0.0, max = 2.0), extend("x-source" = "Reitberger et al. 2009: 0.16"))]
@@ -218,6 +237,17 @@ impl SegmentationParams {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn names_are_those_of_pipeline_files() {
+        for method in SegmentMethod::ALL {
+            let written = serde_json::to_value(method).unwrap();
+            assert_eq!(written, method.name());
+        }
+        let schema = schemars::schema_for!(SegmentMethod).to_value();
+        let named = schema["oneOf"].as_array().unwrap().len();
+        assert_eq!(named, SegmentMethod::ALL.len(), "every method is listed");
+    }
 
     #[test]
     fn a_radius_beyond_the_reach_is_refused_where_it_counts() {

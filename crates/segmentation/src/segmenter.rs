@@ -55,17 +55,13 @@ impl View<'_> {
     /// # Errors
     /// [`Error::Length`].
     pub fn check(&self) -> Result<(), Error> {
-        let expected = self.len();
         let columns = [
             ("y", self.y.len()),
             ("z", self.z.len()),
             ("height", self.height_m.len()),
             ("first return", self.is_first.len()),
         ];
-        match columns.into_iter().find(|(_, found)| *found != expected) {
-            Some((column, found)) => Err(Error::Length { column, expected, found }),
-            None => Ok(()),
-        }
+        Error::check_lengths(self.len(), &columns)
     }
 }
 

@@ -4,7 +4,7 @@ mod program;
 mod tree_labels;
 
 use crate::blocks::{room_m, segment_in_blocks, sort_markers};
-use crate::{Claim, Crown, Marker, SegmentationParams, Segmenter, View, segmenter};
+use crate::{Claim, Crown, Marker, SegmentMethod, SegmentationParams, Segmenter, View, segmenter};
 use timberline_artefact::kinds::{
     CrownShape, CrownStatus, Detection, Detections, GroundPoints, Heights, Labels, PointTile,
 };
@@ -26,6 +26,9 @@ impl Params for SegmentationParams {
     }
 }
 
+/// ASPRS classes of noise, low and high.
+const NOISE: [u8; 2] = [7, 18];
+
 const INPUTS: &[InputSpec] = &[
     InputSpec::halo(PointTile::NAME),
     InputSpec::halo(GroundPoints::NAME),
@@ -39,7 +42,7 @@ impl Stage for SegmentationStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "segmentation",
-            version: 3,
+            version: 4,
             summary: "the tree of every point, given the trees: see `method` and `command`",
             unit: UnitKind::Tile,
             inputs: INPUTS,
@@ -61,7 +64,16 @@ impl Stage for SegmentationStage {
     }
 
     fn memory_bytes(params: &Self::Params, points: u64) -> u64 {
-        memory_of(&params.command, params.command_memory_limit_mb, points)
+        // The graph of its voxels. Measured on the sample stand: a peak of 230 MB for 0.56 M points in a
+        // tile and its neighbours on one thread (`cargo xtask run` of the shipped pipeline with
+        // `method = "ncut"` and `--only segmentation --jobs 1`), which is 410 a point; several threads
+        // hold the graphs of several squares.
+        const BYTES_PER_POINT_NCUT: u64 = 800;
+        let program = memory_of_program(&params.command, params.command_memory_limit_mb);
+        match params.method {
+            SegmentMethod::Ncut if params.command.is_empty() => points * BYTES_PER_POINT_NCUT,
+            _ => points * BYTES_PER_POINT + program,
+        }
     }
 
     fn run(
@@ -98,11 +110,12 @@ fn files_of(command: &[String]) -> Vec<NamedFile> {
     files.map(|(name, required)| NamedFile { name, param: "command", required }).collect()
 }
 
-/// Peak memory of a task, bytes, with that of a program.
-fn memory_of(command: &[String], limit_mb: u32, points: u64) -> u64 {
-    const BYTES_PER_POINT: u64 = 300;
-    let program = if command.is_empty() { 0 } else { u64::from(limit_mb) * 1_000_000 };
-    points * BYTES_PER_POINT + program
+/// Peak memory of a task that holds little more than its points, bytes a point.
+const BYTES_PER_POINT: u64 = 300;
+
+/// Memory that a program may take, bytes; none where there is no program.
+fn memory_of_program(command: &[String], limit_mb: u32) -> u64 {
+    if command.is_empty() { 0 } else { u64::from(limit_mb) * 1_000_000 }
 }
 
 /// The tree of every point of a tile and its surroundings, by the method that the parameters name.
@@ -173,20 +186,27 @@ fn claims(
     let cloud = &all.cloud;
     // Files that do not count returns say 0.
     let is_first: Vec<bool> = cloud.return_number.iter().map(|number| *number <= 1).collect();
+    let height_m = heights(all);
     let view = View {
         frame: cloud.frame,
         x: &cloud.x,
         y: &cloud.y,
         z: &cloud.z,
-        height_m: &all.height_m,
+        height_m: &height_m,
         is_first: &is_first,
         markers,
     };
-    if segmenter.is_local() {
-        return segmenter.segment(&view);
-    }
     let own: Vec<bool> = all.own.iter().map(Option::is_some).collect();
     segment_in_blocks(segmenter, &view, &own, params.block_m)
+}
+
+/// Heights above ground, unknown for what the scan says is noise: it has no tree and is no part of
+/// the canopy's surface. Noise is there only where the stage `tiles` was told to keep it.
+fn heights(all: &Surroundings) -> Vec<f32> {
+    let known = all.height_m.iter().zip(&all.cloud.classification);
+    known
+        .map(|(height_m, class)| if NOISE.contains(class) { f32::NAN } else { *height_m })
+        .collect()
 }
 
 fn labels(claims: &[Claim]) -> Labels {

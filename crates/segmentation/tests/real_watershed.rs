@@ -15,9 +15,11 @@ use timberline_segmentation::{
     Chm, Marker, Piece, PitFree, SegmentMethod, SegmentationParams, segment_in_blocks, segmenter,
 };
 
-/// Immersion (Vincent and Soille 1991) on the highest point of every cell, in the whole scan at once
-/// and without a largest radius: level by level, a cell takes the basin of its highest neighbour in
-/// one, and with it all that it alone connects. Returns the tree of every cell, counted from 1.
+/// Immersion (after Vincent and Soille 1991) of the canopy height model that the segmenter works on,
+/// here of the whole scan at once and without a largest radius. From the highest cell down, a cell
+/// with an apex begins a basin, any other takes that of its highest neighbour in one; with it go the
+/// cells, no lower than it, that are connected and have none. Returns the tree of every cell, counted
+/// from 1.
 fn immersion(chm: &Chm, markers: &[Marker], least_m: f32) -> Vec<usize> {
     let mut cells: Vec<usize> =
         (0..chm.height_m.len()).filter(|cell| chm.height_m[*cell] >= least_m).collect();

@@ -11,16 +11,6 @@ use timberline_pointcloud::{Point, PointCloud, TileGrid};
 use timberline_segmentation::stage::SegmentationStage;
 use timberline_segmentation::{SegmentMethod, SegmentationParams};
 
-/// All that the program has built in.
-const METHODS: [SegmentMethod; 6] = [
-    SegmentMethod::Starsac,
-    SegmentMethod::Watershed,
-    SegmentMethod::Dalponte,
-    SegmentMethod::Silva,
-    SegmentMethod::Li,
-    SegmentMethod::Ncut,
-];
-
 const CORNER: [f64; 3] = [500_000.0, 4_200_000.0, 80.0];
 
 /// Echoes on a lattice of 0.7 m in the plane and 1.3 m in height.
@@ -75,11 +65,22 @@ fn run(grid: TileGrid) -> BTreeMap<[i64; 3], (u64, u32)> {
 }
 
 fn run_with(grid: TileGrid, params: &SegmentationParams) -> BTreeMap<[i64; 3], (u64, u32)> {
+    run_on(&points().into_iter().map(|point| (point, 0)).collect::<Vec<_>>(), grid, params)
+}
+
+/// The same with points and classes given.
+fn run_on(
+    points: &[([f64; 3], u8)],
+    grid: TileGrid,
+    params: &SegmentationParams,
+) -> BTreeMap<[i64; 3], (u64, u32)> {
     let folder = tempfile::tempdir().unwrap();
     let mut store = Alone::new(folder.path(), Campaign { grid: Some(grid), ..Campaign::default() });
-    let (points, models) = (points(), models());
+    let models = models();
     let mut whole = PointCloud::default();
-    points.iter().for_each(|p| whole.push_world(*p, &Point::default()));
+    for (world, classification) in points {
+        whole.push_world(*world, &Point { classification: *classification, ..Point::default() });
+    }
     let tiles = store.put_tiles(&whole, grid).unwrap();
     for (tile, cloud, facts) in &tiles {
         let height_m = (0..cloud.len()).map(|i| (cloud.world(i)[2] - CORNER[2]) as f32).collect();
@@ -104,7 +105,7 @@ fn run_with(grid: TileGrid, params: &SegmentationParams) -> BTreeMap<[i64; 3], (
 
 #[test]
 fn labels_do_not_depend_on_the_tiles() {
-    for method in METHODS {
+    for method in SegmentMethod::ALL {
         // Small blocks and reaches, so that there are several in the row.
         let params = SegmentationParams {
             method,
@@ -128,9 +129,29 @@ fn labels_do_not_depend_on_the_tiles() {
     }
 }
 
+/// As the stage `tiles` leaves it there when told not to drop it.
+#[test]
+fn noise_has_no_tree_and_is_no_canopy() {
+    let grid = TileGrid::new(64, [0, 0]).unwrap();
+    let clean: Vec<_> = points().into_iter().map(|point| (point, 0)).collect();
+    let mut noisy = clean.clone();
+    for (place, ([x, y, z], _)) in clean.iter().enumerate().step_by(37) {
+        noisy.push(([*x, *y, quantise(z + 17.0)], [7, 18][place % 2]));
+    }
+    for method in SegmentMethod::ALL {
+        let params = SegmentationParams { method, ..SegmentationParams::default() };
+        let (expected, found) = (run_on(&clean, grid, &params), run_on(&noisy, grid, &params));
+        assert_eq!(found.len(), noisy.len());
+        for (position, label) in found {
+            let other = expected.get(&position).copied().unwrap_or_default();
+            assert_eq!(label, other, "{method:?} at {position:?}");
+        }
+    }
+}
+
 #[test]
 fn labels_do_not_depend_on_threads() {
-    for method in METHODS {
+    for method in SegmentMethod::ALL {
         let params = SegmentationParams { method, block_m: 16, reach_m: 6.0, ..Default::default() };
         let with = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();

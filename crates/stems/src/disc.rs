@@ -72,7 +72,7 @@ pub fn discs(cluster: &Cluster, params: &StemsParams) -> Vec<Disc> {
         found.push(disc(cluster.slice, &left, &circle, params));
         // What is near the circle or inside it is explained by it.
         let reach_m = circle.radius_m + 2.0 * params.noise_m;
-        left.retain(|point| circle.from_centre_m(point) > reach_m);
+        left.retain(|point| circle.distance_from_centre_m(point) > reach_m);
     }
     if found.is_empty() {
         found.extend(blob(cluster, params));
@@ -88,7 +88,7 @@ struct Circle {
 }
 
 impl Circle {
-    fn from_centre_m(&self, point: &SlicePoint) -> f64 {
+    fn distance_from_centre_m(&self, point: &SlicePoint) -> f64 {
         let (dx, dy) = (point.x - self.centre_m[0], point.y - self.centre_m[1]);
         (dx * dx + dy * dy).sqrt()
     }
@@ -147,7 +147,7 @@ fn triple(trial: u64, len: usize) -> [usize; 3] {
 /// How well points fit a circle: those near it count, those inside count against it.
 fn score(circle: &Circle, points: &[SlicePoint], noise_m: f64) -> f64 {
     let value = |point: &SlicePoint| {
-        let distance_m = circle.from_centre_m(point);
+        let distance_m = circle.distance_from_centre_m(point);
         let residual = (distance_m - circle.radius_m) / noise_m;
         if residual.abs() < 1.0 {
             1.0 - residual * residual
@@ -165,7 +165,7 @@ fn refine(mut circle: Circle, points: &[SlicePoint], noise_m: f64) -> Circle {
     for _ in 0..ROUNDS {
         let (mut normal, mut right) = (nalgebra::Matrix3::zeros(), nalgebra::Vector3::zeros());
         for point in points {
-            let distance_m = circle.from_centre_m(point);
+            let distance_m = circle.distance_from_centre_m(point);
             let residual_m = distance_m - circle.radius_m;
             let scaled = residual_m / (2.0 * noise_m);
             if scaled.abs() >= 1.0 || distance_m <= 0.0 {
@@ -193,7 +193,8 @@ fn refine(mut circle: Circle, points: &[SlicePoint], noise_m: f64) -> Circle {
 /// Whether a circle looks like a stem: enough of its circumference has points, its inside has few.
 fn is_stem(circle: &Circle, points: &[SlicePoint], params: &StemsParams) -> bool {
     let (on, _, inside) = support(circle, points, params.noise_m);
-    let around = points.iter().filter(|p| circle.from_centre_m(p) <= 1.5 * circle.radius_m).count();
+    let around =
+        points.iter().filter(|p| circle.distance_from_centre_m(p) <= 1.5 * circle.radius_m).count();
     on.len() >= FEWEST
         && coverage(circle, &on) >= LEAST_COVERAGE
         && inside as f64 <= MOST_INSIDE * on.len() as f64
@@ -208,7 +209,7 @@ fn support<'a>(
 ) -> (Vec<&'a SlicePoint>, usize, usize) {
     let (mut on, mut outside, mut inside) = (Vec::new(), 0, 0);
     for point in points {
-        let distance_m = circle.from_centre_m(point);
+        let distance_m = circle.distance_from_centre_m(point);
         if (distance_m - circle.radius_m).abs() <= noise_m {
             on.push(point);
         } else if distance_m > circle.radius_m {

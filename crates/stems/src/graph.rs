@@ -42,7 +42,7 @@ impl Graph {
         let back: Vec<_> = links.iter().map(|&(from, to, length)| (to, from, length)).collect();
         let mut all = links;
         all.extend(back);
-        all.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)));
+        all.sort_by_key(|link| (link.0, link.1));
         all.dedup_by_key(|link| (link.0, link.1));
         let mut graph = Self { start: Vec::with_capacity(len + 1), ..Self::default() };
         let mut next = 0;

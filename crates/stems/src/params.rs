@@ -34,6 +34,9 @@ pub struct StemsParams {
     /// Height a stem must be seen over.
     #[schemars(range(min = 0.2, max = 10.0), extend("x-unit" = "m", "x-source" = "longer than what low branches and shrubs show"))]
     pub smallest_span_m: f64,
+    /// Lower trees are undergrowth; where no ground is seen, none is too low.
+    #[schemars(range(min = 0.0, max = 50.0), extend("x-unit" = "m", "x-source" = "national inventories leave out saplings"))]
+    pub smallest_height_m: f64,
     /// Edge of the voxels in which points are given to trees.
     #[schemars(range(min = 0.01, max = 0.5), extend("x-unit" = "m", "x-source" = "finer than the gaps between touching crowns"))]
     pub voxel_m: f64,
@@ -64,6 +67,7 @@ impl Default for StemsParams {
             smallest_dbh_m: 0.04,
             largest_dbh_m: 2.0,
             smallest_span_m: 1.0,
+            smallest_height_m: 3.0,
             voxel_m: 0.05,
             gap_m: 1.0,
             clearance_m: 0.1,

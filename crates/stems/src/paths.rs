@@ -1,7 +1,9 @@
 //! The stem with the cheapest way to every voxel: comparative shortest paths (Tao et al. 2015,
 //! "Segmenting tree crowns from terrestrial and mobile LiDAR data by exploring ecological theories").
 //!
-//! Ways are divided by a power of the stem's diameter, because thicker stems feed wider crowns.
+//! Ways are divided by a power of the stem's diameter, because thicker stems feed wider crowns. A
+//! step costs its length and more where it leaps over a gap, because branches hang together and
+//! neighbouring crowns do not.
 
 use crate::graph::Graph;
 use std::cmp::{Ordering, Reverse};
@@ -17,6 +19,9 @@ pub struct Source {
     /// What ways from there are divided by.
     pub scale: f64,
 }
+
+/// Length of a step that costs twice its length, m.
+const LEAP_M: f64 = 0.2;
 
 /// Label of voxels that no way reaches.
 pub const UNREACHED: u32 = u32::MAX;
@@ -66,7 +71,7 @@ pub fn cheapest(graph: &Graph, sources: &[Source]) -> Vec<u32> {
         }
         (label[at], cost[at]) = (end.label, end.cost);
         for (to, length_m) in graph.neighbours(end.at) {
-            let next = end.cost + length_m / end.scale;
+            let next = end.cost + length_m * (1.0 + length_m / LEAP_M) / end.scale;
             if label[to as usize] == UNREACHED && next <= cost[to as usize] {
                 cost[to as usize] = next;
                 let End { label, scale, .. } = end;

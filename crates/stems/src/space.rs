@@ -189,7 +189,30 @@ impl Scene<'_> {
             owner[at as usize] = if (label as usize) < axes.len() { label } else { UNREACHED };
         }
         let trees = (0..).zip(axes).map(|(tree, axis)| self.tree(tree, axis, &owner)).collect();
-        Ok(Space { trees, owner })
+        Ok(self.without_saplings(Space { trees, owner }))
+    }
+
+    /// Leaves out trees that are too low, with their voxels.
+    fn without_saplings(&self, space: Space) -> Space {
+        let up_m = self.frame.origin_m[2] as f64;
+        let mut top_m = vec![f64::NEG_INFINITY; space.trees.len()];
+        for (position, owner) in self.positions.iter().zip(&space.owner) {
+            if let Some(top) = top_m.get_mut(*owner as usize) {
+                *top = top.max(position[2] + up_m);
+            }
+        }
+        let high = |tree: &Tree, top: f64| {
+            !self.has_ground || top - tree.base_m[2] >= self.params.smallest_height_m
+        };
+        let (mut place, mut trees) = (vec![UNREACHED; space.trees.len()], Vec::new());
+        for (old, (tree, top)) in space.trees.into_iter().zip(top_m).enumerate() {
+            if high(&tree, top) {
+                place[old] = trees.len() as u32;
+                trees.push(tree);
+            }
+        }
+        let moved = |old: &u32| place.get(*old as usize).copied().unwrap_or(UNREACHED);
+        Space { trees, owner: space.owner.iter().map(moved).collect() }
     }
 
     /// Height above ground, or above the lowest points, m.

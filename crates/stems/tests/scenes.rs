@@ -140,6 +140,14 @@ fn a_tree_without_ground_stands_on_its_lowest_points() {
 }
 
 #[test]
+fn a_sapling_is_undergrowth() {
+    let mut points = plot();
+    points.extend(stem([10.0, 10.0], 0.03, 1.0, 2.5, 3000));
+    let (_, Stems { stems, .. }) = Scene::run(&points, [0.0; 3], 32).unwrap();
+    assert_eq!(stems.len(), 3);
+}
+
+#[test]
 fn two_trees_in_one_cloud_without_ground_are_two() {
     let mut points = stem([3.0, 3.0], 0.15, 1.0, 12.0, 6000);
     points.extend(stem([5.0, 3.0], 0.12, 1.0, 10.0, 6000));

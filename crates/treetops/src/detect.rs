@@ -5,13 +5,12 @@ use crate::input::Ranked;
 use crate::maxima::{CELL_TICKS, Surface, cell_ticks};
 use crate::model::MODEL;
 use crate::prominence::prominence;
-
 use crate::window::Window;
 use crate::{Candidate, Error, Input, Method, Params, apart};
 use rayon::prelude::*;
 use timberline_pointcloud::order;
 
-/// A treetop.
+/// A treetop: a candidate for a tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Treetop {
     /// Index of its point in the cloud.
@@ -20,7 +19,8 @@ pub struct Treetop {
     pub world_m: [f64; 3],
     /// Height above ground, metres.
     pub height_m: f64,
-    /// Diameter or edge of the window in which nothing outranks it, metres.
+    /// Diameter or edge of the window in which nothing outranks it, metres; for the method by
+    /// evidence, in which nothing lies just above it (within `candidate_gap_m`).
     pub window_m: f64,
     /// Least descent on a way to anything higher, metres; see [`crate::prominence`]. NaN for the
     /// method by evidence, which does not ask for it.
@@ -35,7 +35,8 @@ pub struct Treetop {
 ///
 /// The result is the same in any frame and for any order of the points (but for the indices), and
 /// whether a point is a top depends only on points within [`Params::halo_m`] of it in the plane.
-/// Cost: a sort of the points, then about constant time per half-metre cell.
+/// Cost by window: a sort of the points, then about constant time per half-metre cell. By
+/// evidence: for every candidate a look at all points within [`REACH_M`](crate::evidence::REACH_M).
 ///
 /// # Errors
 /// [`Error::Params`] when [`Params::check`] finds something, [`Error::Length`] when a column does
@@ -120,4 +121,15 @@ fn treetop(surface: &Surface<'_>, index: u32, window: Window) -> Treetop {
 fn stands_out(params: &Params, top: &Treetop) -> bool {
     let least = params.min_prominence_m.max(params.min_prominence_ratio * top.height_m);
     top.prominence_m >= least
+}
+
+#[cfg(test)]
+mod tests {
+    use super::MODEL;
+    use crate::evidence::LEN;
+
+    #[test]
+    fn the_model_asks_for_values_that_there_are() {
+        assert!(MODEL.nodes.iter().all(|node| usize::from(node.0) < LEN));
+    }
 }

@@ -54,7 +54,8 @@ pub enum RankBy {
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
     /// How treetops are found. The parameters of the window and of prominence serve the method
-    /// `window`, those of candidates, score and distance the method `evidence`.
+    /// `window`, those of candidates, score and distance the method `evidence`. With either they are
+    /// candidates, of which the stage `detection` chooses; its `min_score = 0` keeps them all.
     #[schemars(extend("x-source" = "window: Tittmann et al. 2011, section 3; evidence: this program"))]
     pub method: Method,
     /// Evidence: a candidate has no point above it within this radius in the plane ...
@@ -68,16 +69,16 @@ pub struct Params {
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1", "x-source" = "this program"))]
     pub min_score: f64,
     /// Evidence: of two candidates nearer than this in the plane the better stands ...
-    #[schemars(range(min = 0.1, max = 5.0), extend("x-unit" = "m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    #[schemars(range(min = 0.1, max = 5.0), extend("x-unit" = "m", "x-source" = "this program; set on simulated stands, no command varies it"))]
     pub apart_m: f64,
     /// ... and the more for each metre of the candidate's height ...
-    #[schemars(range(min = 0.0, max = 0.1), extend("x-unit" = "m/m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    #[schemars(range(min = 0.0, max = 0.1), extend("x-unit" = "m/m", "x-source" = "this program; set on simulated stands, no command varies it"))]
     pub apart_per_height: f64,
     /// ... unless they are further apart than this in elevation ...
-    #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    #[schemars(range(min = 0.5, max = 30.0), extend("x-unit" = "m", "x-source" = "this program; set on simulated stands, no command varies it"))]
     pub apart_vertical_m: f64,
     /// ... and the more for each metre of height.
-    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "m/m", "x-source" = "measured on simulated stands (xtask experiment segmentation)"))]
+    #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "m/m", "x-source" = "this program; set on simulated stands, no command varies it"))]
     pub apart_vertical_per_height: f64,
     /// Shape and size of the window.
     #[schemars(extend("x-source" = "variable: Popescu and Wynne 2004; square: Tittmann et al. 2011, section 3"))]

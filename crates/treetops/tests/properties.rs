@@ -51,6 +51,13 @@ fn all_params() -> impl Strategy<Value = Params> {
     )
 }
 
+/// By evidence, with a halo shorter than the 12 m over which the points lie.
+fn by_evidence(params: Params) -> Params {
+    let params = Params { method: Method::Evidence, min_score: 0.0, max_height_m: 15.0, ..params };
+    assert!(params.halo_m() < 8.0, "{}", params.halo_m());
+    params
+}
+
 /// The definition of a treetop, with no cells and no short cuts.
 fn by_definition(cloud: &PointCloud, height_m: &[f32], params: &Params) -> Vec<u32> {
     let rank = |i: usize| match params.rank_by {
@@ -137,8 +144,14 @@ proptest! {
     }
 
     #[test]
-    fn only_the_halo_matters(raw in raw_points(250), params in all_params(), edge in 0i32..120) {
+    fn only_the_halo_matters(
+        raw in raw_points(250),
+        params in all_params(),
+        evidence in any::<bool>(),
+        edge in 0i32..120,
+    ) {
         let params = Params { min_prominence_m: 0.5, prominence_reach_m: 1.0, ..params };
+        let params = if evidence { by_evidence(params) } else { params };
         let (cloud, height_m) = cloud_of(&raw, [0, 0, 0]);
         let whole = find(&Input::new(&cloud, &height_m), &params).unwrap();
         let border = f64::from(edge) * 0.1 + 4_997.0;

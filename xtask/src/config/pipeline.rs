@@ -5,6 +5,7 @@ use super::{Document, Place, Problem, Problems, check, nearest};
 use crate::registry::{AnyStage, Registry};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::Read;
 use std::path::{Path, PathBuf};
 
 /// A pipeline in effect: every parameter has its value.
@@ -303,16 +304,28 @@ fn named_files(
     let mut files = BTreeMap::new();
     for named in stage.files(params).unwrap_or_default() {
         let path = folder.join(&named.name);
-        if path.exists() {
-            files.insert(named.name, path);
-        } else if named.required {
-            let what = format!("`{}` names `{}`: there is no such file", named.param, named.name);
+        let fault = if !path.exists() {
             let hint = format!("relative paths count from {}", folder.display());
+            named.required.then(|| ("there is no such file".to_owned(), hint))
+        } else if let Err(error) = first_byte(&path) {
+            let hint = "its contents are part of the key: make it readable".to_owned();
+            Some((format!("it cannot be read ({error})"), hint))
+        } else {
+            files.insert(named.name.clone(), path);
+            None
+        };
+        if let Some((fault, hint)) = fault {
+            let what = format!("`{}` names `{}`: {fault}", named.param, named.name);
             let place = places.get(named.param).copied().unwrap_or(at);
             found.push(Problem::new(&document.path, Some(place), what).hint(Some(hint)));
         }
     }
     files
+}
+
+/// Reads the beginning of a file; a folder has none.
+fn first_byte(path: &Path) -> std::io::Result<()> {
+    if path.is_dir() { Ok(()) } else { std::fs::File::open(path)?.read(&mut [0]).map(drop) }
 }
 
 /// The parameters that a schema marks as limits.

@@ -84,20 +84,25 @@ pub struct Named {
 }
 
 impl Named {
-    fn look(name: &str, path: &Path) -> Self {
+    fn look(name: &str, path: &Path) -> Result<Self, String> {
         let stamp = Stamp::of(path);
         let hash = match path.is_dir() {
             true => "a folder, whose contents do not count".to_owned(),
-            false => content_hash(path).unwrap_or_else(|error| format!("unreadable: {error}")),
+            false => content_hash(path).map_err(|error| {
+                format!(
+                    "{} cannot be read: {error}; its contents are part of the key",
+                    path.display()
+                )
+            })?,
         };
-        Self { name: name.to_owned(), path: path.to_owned(), stamp, hash }
+        Ok(Self { name: name.to_owned(), path: path.to_owned(), stamp, hash })
     }
 
     /// Whether the file is still what it was when the stage was planned.
     #[must_use]
     pub fn is_unchanged(&self) -> bool {
         let touched = self.stamp.is_none() || self.stamp != Stamp::of(&self.path);
-        !touched || Self::look(&self.name, &self.path).hash == self.hash
+        !touched || Self::look(&self.name, &self.path).is_ok_and(|now| now.hash == self.hash)
     }
 }
 
@@ -118,7 +123,7 @@ impl UnitPlan {
 /// Plans one stage, given the stages before it. Units come sorted.
 ///
 /// # Errors
-/// What the stage says about its parameters.
+/// What the stage says about its parameters; a file that they name and that cannot be read.
 pub fn plan_stage(
     pipeline: &Pipeline,
     position: usize,
@@ -126,7 +131,7 @@ pub fn plan_stage(
     store: &Store,
     before: &Progressed,
 ) -> Result<Vec<UnitPlan>, String> {
-    let planner = Planner::new(pipeline, position, survey, store, before);
+    let planner = Planner::new(pipeline, position, survey, store, before)?;
     planner.units().into_iter().map(|unit| planner.unit(unit)).collect()
 }
 
@@ -154,11 +159,12 @@ impl<'a> Planner<'a> {
         survey: &'a Survey,
         store: &'a Store,
         before: &'a Progressed,
-    ) -> Self {
+    ) -> Result<Self, String> {
         let stage = &pipeline.stages[position];
         let halo_m = stage.stage.halo_m(&stage.params);
         let by_tile = BTreeMap::new();
-        let named = stage.files.iter().map(|(name, path)| Named::look(name, path)).collect();
+        let named = stage.files.iter().map(|(name, path)| Named::look(name, path));
+        let named = named.collect::<Result<_, _>>()?;
         let mut planner = Self {
             pipeline,
             position,
@@ -183,7 +189,7 @@ impl<'a> Planner<'a> {
             }
             planner.by_tile.insert(from, index);
         }
-        planner
+        Ok(planner)
     }
 
     fn stage(&self) -> &'a PipelineStage {
@@ -462,8 +468,24 @@ pub fn targets(store: &Store, stage: &PipelineStage, plan: &UnitPlan) -> Vec<Pat
 
 #[cfg(test)]
 mod tests {
-    use super::canonical;
+    use super::{Named, canonical};
     use serde_json::json;
+    use std::path::Path;
+
+    #[test]
+    fn a_named_file_that_cannot_be_read_has_no_key() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a");
+        assert!(Named::look("a", &path).unwrap_err().contains("cannot be read"));
+        std::fs::write(&path, "one").unwrap();
+        let named = Named::look("a", &path).unwrap();
+        assert!(named.is_unchanged());
+        std::fs::write(&path, "other").unwrap();
+        assert!(!named.is_unchanged());
+        std::fs::remove_file(&path).unwrap();
+        assert!(!named.is_unchanged());
+        assert!(Named::look("..", Path::new("..")).is_ok(), "contents of folders do not count");
+    }
 
     #[test]
     fn canonical_json_is_sorted() {

@@ -1,6 +1,6 @@
 //! The engine over a tiny chain: what runs, what does not, and what it says about it.
 
-use crate::support::{PIPELINE, Stand, row_text, tile};
+use crate::support::{PIPELINE, REWRITES_ITSELF, Stand, row_text, tile};
 use std::collections::BTreeMap;
 use std::path::Path;
 use xtask::engine::runlog::{self, Event};
@@ -118,6 +118,29 @@ fn a_changed_script_runs_its_stage_and_what_follows() {
     stand.write("pipeline.toml", PIPELINE);
     let (_, why) = plan(&stand, "sum", &[]);
     assert!(why.contains("parameter `script`"), "{why}");
+}
+
+/// Its key says what the script was, so what it may have read after that must not stay under it.
+#[test]
+fn a_script_that_changes_while_a_unit_runs_fails_the_unit() {
+    let stand = ran_with_script();
+    stand.write("scripts/a.txt", REWRITES_ITSELF);
+    let ran = stand.run(&[]);
+    assert_eq!((ran.code, Stand::done(&ran)), (1, BTreeMap::new()), "{}", ran.stderr);
+    assert!(ran.stderr.contains("a.txt was changed meanwhile; run again"), "{}", ran.stderr);
+    assert_eq!(Stand::done(&stand.run(&[])), counts(&[("sum", 16), ("blur", 16), ("finish", 1)]));
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_script_that_cannot_be_read_is_a_fault_of_the_pipeline_file() {
+    let stand = ran_with_script();
+    let text = std::fs::read_to_string(stand.path("pipeline.toml")).unwrap();
+    // Nobody, root included, can read its beginning.
+    stand.write("pipeline.toml", &text.replace("scripts/a.txt", "/proc/self/mem"));
+    let ran = stand.run(&[]);
+    let expected = "`script` names `/proc/self/mem`: it cannot be read";
+    assert!(ran.code == 2 && ran.stderr.contains(expected), "{}", ran.stderr);
 }
 
 #[test]

@@ -11,13 +11,13 @@ pub struct Detections {
     pub trees: Vec<Detection>,
 }
 
-/// What a tree was found by.
+/// Whether something hangs over a tree's top.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 pub enum Origin {
-    /// A local maximum of all points.
+    /// Nothing does.
     #[default]
     Surface,
-    /// A local maximum of the points that the trees above it do not explain.
+    /// Points further above it than its own crown can reach (`candidate_gap_m` of `treetops`).
     BelowCanopy,
 }
 
@@ -39,7 +39,7 @@ pub struct Detection {
     pub model: CrownModel,
     /// How sure it is that this is a tree, 0 to 1.
     pub score: f32,
-    /// What it was found by.
+    /// Whether something hangs over its top.
     pub origin: Origin,
 }
 

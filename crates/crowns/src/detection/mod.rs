@@ -99,6 +99,15 @@ impl Candidates {
     pub fn scores(&self) -> Vec<f64> {
         self.evidence().iter().map(|evidence| MODEL.probability(evidence)).collect()
     }
+
+    /// The candidates that are trees: ids and scores, sorted by id. A score is compared with the
+    /// least one before it is rounded.
+    #[must_use]
+    pub fn trees(&self, min_score: f64) -> Vec<(u64, f32)> {
+        let scored = self.all.iter().zip(self.scores());
+        let trees = scored.filter(|(_, score)| *score >= min_score);
+        trees.map(|(candidate, score)| (candidate.id, score as f32)).collect()
+    }
 }
 
 #[cfg(test)]
@@ -150,6 +159,23 @@ mod tests {
         ]
         .map(|one| scores(&[one])[0]);
         assert!(with > 0.8 && with > without, "{with} with a crown, {without} without");
+    }
+
+    #[test]
+    fn the_model_asks_for_values_that_there_are() {
+        assert!(MODEL.nodes.iter().all(|node| usize::from(node.0) < LEN));
+    }
+
+    #[test]
+    fn trees_are_the_candidates_from_the_least_score_on() {
+        let bump = Candidate { radius_m: 0.5, inliers: 9, ..tree(2, 1.5, 18.0, 0.5) };
+        let candidates = Candidates::new(vec![bump, tree(1, 0.0, 20.0, 0.95)], 10.0).unwrap();
+        let scores = candidates.scores();
+        let of = |place: usize| (place as u64 + 1, scores[place] as f32);
+        assert!(scores[1] < scores[0]);
+        assert_eq!(candidates.trees(scores[1]), [of(0), of(1)]);
+        assert_eq!(candidates.trees(scores[1].next_up()), [of(0)]);
+        assert_eq!(candidates.trees(1.0), []);
     }
 
     #[test]

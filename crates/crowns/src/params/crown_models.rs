@@ -82,7 +82,8 @@ pub struct CrownModelParams {
     /// 0 for windows of one size, as in the paper.
     #[schemars(range(min = 0.0, max = 5.0), extend("x-unit" = "1", "x-source" = "this program: crowns are rarely wider than tall"))]
     pub window_per_height: f64,
-    /// Which echoes are looked at.
+    /// Which echoes are looked at around treetops over which nothing hangs. Below other crowns it is
+    /// all of them, but for those far above the apex.
     #[schemars(extend("x-source" = "this program"))]
     pub returns: Returns,
     /// Points lower than this above the ground are in no crown.

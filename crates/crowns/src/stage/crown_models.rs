@@ -1,7 +1,6 @@
 //! The stage `crown-models`.
 
-use super::{BATCH, GRID_CELL_M};
-use crate::Window;
+use super::{BATCH, GRID_CELL_M, top_of};
 use crate::params::CrownModelParams;
 use crate::starsac::{self, Outcome, Rejection, Shape};
 use rayon::prelude::*;
@@ -33,7 +32,7 @@ impl Stage for CrownModelStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "crown-models",
-            version: 2,
+            version: 3,
             summary: "A crown surface around every treetop by sample consensus (StarSac, Tittmann et al. 2011)",
             unit: UnitKind::Tile,
             inputs: MODEL_INPUTS,
@@ -74,15 +73,7 @@ fn model_of(
     grid: &Grid2,
     params: &CrownModelParams,
 ) -> CrownModel {
-    let cloud = &near.cloud;
-    let apex = cloud.frame.local_from_world(top.apex_m);
-    let accept = |i: usize| {
-        let is_first = cloud.return_number[i] <= 1;
-        let wanted = params.is_seen(is_first, cloud.z[i] - apex[2], f64::from(top.cover_m));
-        wanted.then(|| f64::from(near.height_m[i]) >= params.min_height_m)
-    };
-    let half_width = params.half_width_m(top.height_m);
-    let window = Window::gather([&cloud.x, &cloud.y, &cloud.z], grid, apex, half_width, accept);
+    let window = top_of(top).window(&near.cloud, &near.height_m, grid, params);
     wire(top, params, &starsac::fit_window(&window, params, top.id))
 }
 
@@ -130,5 +121,5 @@ fn warn_rejected(model: &CrownModel, context: &Context<'_>) {
     };
     let (inliers, outliers) = (model.inliers, model.outliers);
     let message = format!("no crown: {} ({inliers} inliers, {outliers} outliers)", reason.reason());
-    context.warn(format!("tree {}", model.id), message);
+    context.warn(format!("candidate {}", model.id), message);
 }

@@ -1,5 +1,6 @@
 //! The stage `detection`.
 
+use super::top_of;
 use crate::detection::{Candidate, Candidates};
 use crate::params::DetectionParams;
 use timberline_artefact::kinds::{
@@ -45,17 +46,12 @@ impl Stage for DetectionStage {
         let (_, Treetops { tops }) = inputs.own::<Treetops>()?;
         let candidates = Candidates::new(gather(inputs)?, params.reach_m)?;
         context.check_cancelled()?;
-        let scores = candidates.scores();
-        let score_of = |id: u64| {
-            let place = candidates.all().binary_search_by_key(&id, |one| one.id).ok()?;
-            Some(scores[place])
-        };
+        let chosen = candidates.trees(params.min_score);
         let mut trees = Vec::new();
         for (model, top) in models.into_iter().zip(&tops) {
-            let score = score_of(model.id).unwrap_or_default();
-            if score >= params.min_score {
+            if let Ok(place) = chosen.binary_search_by_key(&model.id, |(id, _)| *id) {
                 let origin = if top.cover_m > 0.0 { Origin::BelowCanopy } else { Origin::Surface };
-                trees.push(Detection { model, score: score as f32, origin });
+                trees.push(Detection { model, score: chosen[place].1, origin });
             }
         }
         let facts = facts(Facts::located_like(&header.facts), tops.len(), &trees);
@@ -90,15 +86,11 @@ fn gather(inputs: &Inputs) -> Result<Vec<Candidate>, StageError> {
 fn candidate(model: &CrownModel, top: &Treetop) -> Candidate {
     let stands = model.status == CrownStatus::Accepted;
     Candidate {
-        id: model.id,
-        apex: model.apex_m,
-        height_m: model.height_m,
-        score: f64::from(top.score),
-        cover_m: f64::from(top.cover_m),
         coefficients: if stands { model.coefficients() } else { [0.0; 2] },
         radius_m: if stands { model.radius_m } else { 0.0 },
         inliers: model.inliers,
         outliers: model.outliers,
         residual: model.residual_m / model.tolerance_m,
+        ..top_of(top).candidate()
     }
 }

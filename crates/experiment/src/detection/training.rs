@@ -9,7 +9,7 @@ use timberline_treetops::evidence::LEN;
 use timberline_treetops::{Candidate, Input, Params, candidates};
 
 /// The stands models are found on: those of an experiment, on several slopes, with crowns smooth
-/// and dented.
+/// and dented. What repetitions take in turn goes in step, so not everything meets everything.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Training {
     /// Stands, densities and repetitions.
@@ -24,6 +24,21 @@ pub struct Training {
 
 impl Default for Training {
     /// Seed 1000: experiments of other seeds share no stand with it.
+    ///
+    /// Repetition r takes the values at r modulo their number, so that the six give these six
+    /// combinations, with every kind of stand and density, and no others:
+    ///
+    /// | r | slope | crown scale | relief |
+    /// |--:|------:|------------:|-------:|
+    /// | 1 |   25° |         1.0 |    1.0 |
+    /// | 2 |    4° |         0.8 |    2.0 |
+    /// | 3 |   25° |         1.5 |    0.0 |
+    /// | 4 |    4° |         1.0 |    1.0 |
+    /// | 5 |   25° |         1.0 |    2.0 |
+    /// | 6 |    4° |         0.8 |    0.0 |
+    ///
+    /// Narrow crowns stood on gentle slopes only, wide ones on steep ground only, and smooth ones of
+    /// the common width not at all.
     fn default() -> Self {
         Self {
             experiment: Experiment { seed: 1000, repeats: 6, ..Experiment::default() },
@@ -45,21 +60,25 @@ impl Training {
         done: &(dyn Fn() + Sync),
     ) -> Result<Vec<(StandKind, T)>, Error> {
         let of = |case: &Case| {
-            let turn = |values: &[f64]| {
-                let place = case.repeat as usize % values.len().max(1);
-                values.get(place).copied().unwrap_or_default()
-            };
-            let experiment = Experiment {
-                slope_deg: turn(&self.slopes_deg),
-                crown_scale: turn(&self.crown_scales),
-                crown_relief: turn(&self.reliefs),
-                ..self.experiment.clone()
-            };
-            let result = visit(&Plot::generate(&experiment, case)?);
+            let result = visit(&Plot::generate(&self.of_case(case), case)?);
             done();
             result.map(|value| (case.stand, value))
         };
         self.experiment.cases().par_iter().map(of).collect()
+    }
+
+    /// The experiment with what is a case's turn.
+    fn of_case(&self, case: &Case) -> Experiment {
+        let turn = |values: &[f64]| {
+            let place = case.repeat as usize % values.len().max(1);
+            values.get(place).copied().unwrap_or_default()
+        };
+        Experiment {
+            slope_deg: turn(&self.slopes_deg),
+            crown_scale: turn(&self.crown_scales),
+            crown_relief: turn(&self.reliefs),
+            ..self.experiment.clone()
+        }
     }
 }
 
@@ -88,6 +107,10 @@ pub fn treetops(
 }
 
 /// The candidates that treetops and crown models leave, with what speaks for and against each.
+///
+/// Among the values is the score of the treetop. Where its model was found on the same stands, as
+/// that of the default parameters was, these scores are surer than they are on stands it has never
+/// seen, and what is found here leans on them the more.
 ///
 /// # Errors
 /// As [`treetops`].
@@ -146,4 +169,33 @@ fn balanced<const N: usize>(cases: Vec<(StandKind, Vec<Sample<N>>)>) -> Vec<Samp
         samples.into_iter().map(move |sample| Sample { weight, ..sample })
     });
     weighted.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_default_has_the_combinations_that_its_documentation_tells() {
+        let training = Training::default();
+        let cases = training.experiment.cases();
+        let mut found: Vec<(u32, [f64; 3])> = cases
+            .iter()
+            .map(|case| {
+                let of = training.of_case(case);
+                (case.repeat, [of.slope_deg, of.crown_scale, of.crown_relief])
+            })
+            .collect();
+        found.sort_by_key(|(repeat, _)| *repeat);
+        found.dedup();
+        let expected = [
+            (1, [25.0, 1.0, 1.0]),
+            (2, [4.0, 0.8, 2.0]),
+            (3, [25.0, 1.5, 0.0]),
+            (4, [4.0, 1.0, 1.0]),
+            (5, [25.0, 1.0, 2.0]),
+            (6, [4.0, 0.8, 0.0]),
+        ];
+        assert_eq!(found, expected);
+    }
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 use timberline_artefact::tree_id;
 use timberline_crowns::detection::{Candidate, Candidates};
 use timberline_crowns::starsac::{CrownModel, Shape, fit_window};
-use timberline_crowns::{CrownModelParams, DetectionParams, Window};
+use timberline_crowns::{CrownModelParams, DetectionParams, Top};
 use timberline_pointcloud::Grid2;
 use timberline_segmentation::{Crown, Marker, View};
 use timberline_treetops::{Input, Treetop, find};
@@ -42,13 +42,13 @@ impl Chain {
     /// What the stages refuse.
     pub fn markers(&self, plot: &Plot) -> Result<Vec<Marker>, Error> {
         let modelled = self.modelled(plot)?;
-        let candidates = self.rivals(&modelled)?;
-        let markers = modelled.into_iter().zip(candidates.scores()).map(|(one, score)| {
+        let chosen = self.rivals(&modelled)?.trees(self.detection.min_score);
+        let marker = |one: Modelled| {
+            let place = chosen.binary_search_by_key(&one.crown.id, |(id, _)| *id).ok()?;
             let height_m = one.candidate.height_m;
-            Marker { crown: one.crown, height_m, score: score as f32 }
-        });
-        let least = self.detection.min_score as f32;
-        Ok(markers.filter(|marker| marker.score >= least).collect())
+            Some(Marker { crown: one.crown, height_m, score: chosen[place].1 })
+        };
+        Ok(modelled.into_iter().filter_map(marker).collect())
     }
 
     /// The candidates for trees of a plot, to be judged, sorted by id, and their points.
@@ -79,19 +79,14 @@ impl Chain {
 
     fn model(&self, plot: &Plot, grid: &Grid2, top: &Treetop) -> Modelled {
         let (cloud, params) = (&plot.cloud, &self.crown_models);
-        let id = tree_id(top.world_m[0], top.world_m[1]);
-        let apex = cloud.local(top.index as usize);
-        let accept = |i: usize| {
-            let wanted = params.is_seen(plot.is_first[i], cloud.z[i] - apex[2], top.cover_m);
-            wanted.then(|| f64::from(plot.height_m[i]) >= params.min_height_m)
-        };
-        let half_width_m = params.half_width_m(top.height_m);
-        let window =
-            Window::gather([&cloud.x, &cloud.y, &cloud.z], grid, apex, half_width_m, accept);
-        let outcome = fit_window(&window, params, id);
+        let Treetop { index, world_m: apex_m, height_m, .. } = *top;
+        let id = tree_id(apex_m[0], apex_m[1]);
+        let (score, cover_m) = (top.score as f32, top.cover_m as f32);
+        let top = Top { id, apex_m, height_m, score, cover_m };
+        let outcome = fit_window(&top.window(cloud, &plot.height_m, grid, params), params, id);
         let blank = Crown {
             id,
-            apex,
+            apex: cloud.local(index as usize),
             coefficients: [0.0; 2],
             radius_m: 0.0,
             tolerance_m: params.tolerance_m,
@@ -99,18 +94,14 @@ impl Chain {
         };
         let crown = outcome.accepted().map_or(blank, |model| standing(model, blank));
         let candidate = Candidate {
-            id,
-            apex,
-            height_m: top.height_m,
-            score: top.score,
-            cover_m: top.cover_m,
             coefficients: crown.coefficients,
             radius_m: crown.radius_m,
             inliers: outcome.crown.as_ref().map_or(0, CrownModel::grade),
             outliers: outcome.crown.as_ref().map_or(0, |model| model.outliers),
             residual: outcome.crown.as_ref().map_or(0.0, |m| m.mean_residual_m / crown.tolerance_m),
+            ..top.candidate()
         };
-        Modelled { index: top.index, candidate, crown }
+        Modelled { index, candidate, crown }
     }
 }
 

@@ -48,39 +48,27 @@ enum How {
 
 type Find = fn(&View<'_>) -> Result<Segments, timberline_segmentation::Error>;
 
-/// Segmenters of the stage, with their names and what they do.
-const GIVEN: [(SegmentMethod, &str, &str); 6] = [
-    (
-        SegmentMethod::Starsac,
-        "starsac",
-        "surface and volume of the crown models (Tittmann et al. 2011)",
-    ),
-    (
-        SegmentMethod::Watershed,
-        "watershed",
-        "marker-controlled watershed on a pit-free canopy height model (Meyer 1994)",
-    ),
-    (
-        SegmentMethod::Dalponte,
-        "dalponte",
-        "region growing on a pit-free canopy height model (Dalponte and Coomes 2016)",
-    ),
-    (
-        SegmentMethod::Silva,
-        "silva",
-        "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)",
-    ),
-    (
-        SegmentMethod::Li,
-        "li",
-        "growing from the top down by spacing in the plane (Li et al. 2012), all trees at once",
-    ),
-    (
-        SegmentMethod::Ncut,
-        "ncut",
-        "normalized cut of a graph of voxels (Reitberger et al. 2009), one part for every tree",
-    ),
-];
+/// What a segmenter of the stage does.
+const fn about(method: SegmentMethod) -> &'static str {
+    match method {
+        SegmentMethod::Starsac => "surface and volume of the crown models (Tittmann et al. 2011)",
+        SegmentMethod::Watershed => {
+            "marker-controlled watershed on a pit-free canopy height model (Meyer 1994)"
+        }
+        SegmentMethod::Dalponte => {
+            "region growing on a pit-free canopy height model (Dalponte and Coomes 2016)"
+        }
+        SegmentMethod::Silva => {
+            "Voronoi cells on a pit-free canopy height model (Silva et al. 2016)"
+        }
+        SegmentMethod::Li => {
+            "growing from the top down by spacing in the plane (Li et al. 2012), all trees at once"
+        }
+        SegmentMethod::Ncut => {
+            "normalized cut of a graph of voxels (Reitberger et al. 2009), one part for every tree"
+        }
+    }
+}
 
 /// Those that find trees themselves.
 const OWN: [(Find, &str, &str); 2] = [
@@ -99,7 +87,11 @@ const OWN: [(Find, &str, &str); 2] = [
 /// All ways to segment, in the sequence of the tables.
 #[must_use]
 pub fn methods() -> Vec<Method> {
-    let given = GIVEN.map(|(method, name, about)| Method { name, about, how: How::Given(method) });
+    let given = SegmentMethod::ALL.map(|method| Method {
+        name: method.name(),
+        about: about(method),
+        how: How::Given(method),
+    });
     let own = OWN.map(|(find, name, about)| Method { name, about, how: How::Own(find) });
     given.into_iter().chain(own).collect()
 }
@@ -146,11 +138,7 @@ impl Method {
 fn segmented_as_given(view: &View<'_>, method: SegmentMethod) -> Result<Vec<Claim>, Error> {
     let params = SegmentationParams { method, ..SegmentationParams::default() };
     let segmenter = segmenter(&params);
-    Ok(if segmenter.is_local() {
-        segmenter.segment(view)?
-    } else {
-        segment_in_blocks(&*segmenter, view, &vec![true; view.len()], params.block_m)?
-    })
+    Ok(segment_in_blocks(&*segmenter, view, &vec![true; view.len()], params.block_m)?)
 }
 
 fn given(plot: &Plot, markers: &[Marker]) -> Vec<FoundTree> {

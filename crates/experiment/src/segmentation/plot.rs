@@ -49,7 +49,7 @@ pub struct Plot {
 /// South-west corner of every judged area, and the terrain's origin.
 const CORNER_M: [i64; 2] = [500_000, 5_000_000];
 /// How far the stand reaches beyond what is scanned, m: crowns hang in from there.
-const BEYOND_M: f64 = 12.0;
+pub(super) const BEYOND_M: f64 = 12.0;
 /// Edge of the square on which the number of returns per pulse is measured, m.
 const PILOT_EDGE_M: f64 = 40.0;
 /// ASPRS classes of noise, low and high.

@@ -2,8 +2,9 @@
 
 use super::compare::{Outcome, Pooled};
 use super::judge::{FoundRow, TrueRow};
-use super::method::methods;
+use super::method::{Method, methods};
 use super::plan::Experiment;
+use super::plot::BEYOND_M;
 use super::real::{BoxRow, ClipRow};
 use super::summary::{LAYERS, Summary, class_names};
 use std::fmt::Write as _;
@@ -165,7 +166,7 @@ fn three(value: Option<f64>) -> String {
 #[must_use]
 pub fn markdown(experiment: &Experiment, pooled: &[Pooled]) -> String {
     let mut text = String::from("# Segmenters compared\n\n");
-    text += &introduction(experiment);
+    text += &introduction(experiment, pooled);
     let found = tree_sets(pooled);
     text += "\n## Trees\n\n";
     text += &trees(&found);
@@ -208,7 +209,7 @@ pub fn tree_sets(pooled: &[Pooled]) -> Vec<Pooled> {
     rows
 }
 
-fn introduction(experiment: &Experiment) -> String {
+fn introduction(experiment: &Experiment, pooled: &[Pooled]) -> String {
     let matching = &experiment.matching;
     let rule = match matching.rule {
         MatchRule::Optimal => "as many pairs as possible, then the least sum of distances",
@@ -218,28 +219,30 @@ fn introduction(experiment: &Experiment) -> String {
         .max_height_difference_m
         .map_or_else(String::new, |limit| format!(" and {limit} m in height"));
     let crowns = crowns(experiment);
-    let segmenters: Vec<String> = methods()
+    let is_shown = |method: &Method| pooled.iter().any(|row| row.method == method.name);
+    let segmenters: String = methods()
         .iter()
+        .filter(|method| is_shown(method))
         .map(|method| format!("* `{}`: {}.\n", method.name, method.about))
         .collect();
     format!(
-        "Seed {}, {} repetition(s): squares of {} m, in stands that reach {} m further on ground of {} \
-         degrees{crowns}. A tree counts from {} m of height on, whether it can be seen from above or not. A \
+        "Seed {}, {} repetition(s): squares of {} m, scanned {} m further in stands that reach {} m further, \
+         on ground of {} degrees{crowns}. A tree counts from {} m of height on, whether it can be seen from above or not. A \
          found tree is a true one when their crown tops are not more than {} m apart in the \
          plane{difference}; {rule}. *Heights alike*: they must \
          not differ by more than {} m, either. *Visible trees*: nothing hangs over their tops; found trees \
          that are hidden ones do not count. Layers are upper, middle and lower thirds of the top height within \
-         {} m. Density is that of all returns.\n\n{}",
+         {} m. Density is that of all returns.\n\n{segmenters}",
         experiment.seed,
         experiment.repeats,
         experiment.judged_edge_m,
         experiment.margin_m,
+        experiment.margin_m + BEYOND_M,
         experiment.slope_deg,
         experiment.min_height_m,
         matching.max_distance_m,
         experiment.max_height_difference_m,
-        experiment.layer_radius_m,
-        segmenters.concat()
+        experiment.layer_radius_m
     )
 }
 

@@ -1,9 +1,11 @@
 //! `points.laz`.
 
 use super::Params;
-use super::survey::{Survey, has_trees, put, read, rename};
+use super::survey::{Survey, put, read, rename};
 use crate::Error;
 use crate::las::{Dimension, DimensionType, LasOptions, LasWriter, offset_for};
+use crate::sorted_trees::SortedTrees;
+use std::collections::BTreeMap;
 use std::fs::File;
 use timberline_artefact::kinds::{GroundPoints, Heights, Labels, PointTile};
 use timberline_artefact::stage::{Context, Inputs, StageError};
@@ -64,7 +66,7 @@ pub(super) fn write(
         for (name, dimension) in &source {
             rename(&mut cloud, name, &dimension.name);
         }
-        put_results(&mut cloud, *tile, inputs)?;
+        put_results(&mut cloud, *tile, &survey.trees, inputs)?;
         writer.write(&cloud)?;
         context.advance(cloud.len() as u64);
     }
@@ -94,20 +96,42 @@ fn labelled(tile: TileId, inputs: &Inputs) -> Result<PointCloud, StageError> {
     Ok(cloud)
 }
 
-fn put_results(cloud: &mut PointCloud, tile: TileId, inputs: &Inputs) -> Result<(), StageError> {
+fn put_results(
+    cloud: &mut PointCloud,
+    tile: TileId,
+    trees: &SortedTrees,
+    inputs: &Inputs,
+) -> Result<(), StageError> {
     let (_, Heights { height_m }) = read::<Heights>(inputs, tile)?;
-    // A point must not name a tree that is in no table.
-    let tree_id = match has_trees(inputs, tile) {
-        true => read::<Labels>(inputs, tile)?.1.tree_id,
-        false => vec![0; cloud.len()],
+    let mut tree_id = match inputs.tile_path(Labels::NAME, tile) {
+        Ok(_) => read::<Labels>(inputs, tile)?.1.tree_id,
+        Err(_) => vec![0; cloud.len()],
     };
     for (kind, found) in [(Heights::NAME, height_m.len()), (Labels::NAME, tree_id.len())] {
         if found != cloud.len() {
             return Err(misaligned(kind, tile, cloud.len(), found).into());
         }
     }
+    keep_told(&mut tree_id, trees)?;
     put(cloud, HEIGHT, Column::F32(height_m));
     put(cloud, TREE, Column::F64(tree_id.iter().map(|id| *id as f64).collect()));
+    Ok(())
+}
+
+/// Takes ids away that are in no table: where a stage failed on a tile, its trees are lost, but
+/// points of the tiles around it may still name them.
+fn keep_told(tree_id: &mut [u64], trees: &SortedTrees) -> Result<(), Error> {
+    let mut told = BTreeMap::from([(0, true)]);
+    for id in tree_id {
+        let is_told = match told.get(id) {
+            Some(known) => *known,
+            None => trees.contains(*id)?,
+        };
+        told.insert(*id, is_told);
+        if !is_told {
+            *id = 0;
+        }
+    }
     Ok(())
 }
 

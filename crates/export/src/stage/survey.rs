@@ -231,7 +231,7 @@ pub(super) fn put(cloud: &mut PointCloud, name: &str, column: Column) {
 
 /// Whether a tile has its trees. Where a stage failed on the way to them, points and terrain are there
 /// all the same.
-pub(super) fn has_trees(inputs: &Inputs, tile: TileId) -> bool {
+fn has_trees(inputs: &Inputs, tile: TileId) -> bool {
     inputs.tile_path(Trees::NAME, tile).is_ok()
 }
 

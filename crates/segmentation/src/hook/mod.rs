@@ -61,10 +61,11 @@ pub struct Program<'a> {
     pub folder: &'a Path,
 }
 
-/// The tree of every point as a program sees it.
+/// The tree of every point as a program sees it, but none for points further than `reach_m` from
+/// the top of theirs.
 ///
-/// `cancelled` is asked many times a second; `log` is given what the program said, once, also when
-/// it failed.
+/// `cancelled` is asked many times a second; `log` is given what the program said, also when it
+/// failed, and then how many points were too far away, if any were.
 ///
 /// # Errors
 /// [`Failure`].

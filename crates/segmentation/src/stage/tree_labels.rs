@@ -48,7 +48,8 @@ impl Stage for TreeLabelsStage {
     }
 
     fn memory_bytes(params: &TreeLabelsParams, points: u64) -> u64 {
-        super::memory_of(&params.command, params.command_memory_limit_mb, points)
+        let program = super::memory_of_program(&params.command, params.command_memory_limit_mb);
+        points * super::BYTES_PER_POINT + program
     }
 
     fn run(

@@ -67,14 +67,15 @@ impl Asked {
     }
 
     /// Squared distance to the nearest point, and its label; of points equally near the lowest label.
-    /// Infinity where there is no point.
-    pub(super) fn nearest(&self, at: [f64; 2]) -> (f64, u32) {
+    /// Infinity where there is no point within `reach_m`; whether one further away is found is not
+    /// said.
+    pub(super) fn nearest(&self, at: [f64; 2], reach_m: f64) -> (f64, u32) {
         let [column, row] = self.cell(at);
         let mut best = (f64::INFINITY, u32::MAX);
         for ring in 0..self.columns.max(self.rows) {
             // What lies in this ring is at least this far away, less what rounding may do.
             let distance = f64::from(ring - 1).max(0.0) * self.cell_m * (1.0 - 1e-9);
-            if best.0 < distance * distance {
+            if best.0.min(reach_m * reach_m) < distance * distance {
                 break;
             }
             for y in (row - ring).max(0)..=(row + ring).min(self.rows - 1) {

@@ -80,7 +80,7 @@ impl<'a> Growth<'a> {
     /// that to the points left, a local maximum belongs if dmin1 <= gap and dmin1 <= dmin2, any
     /// other point if dmin1 <= dmin2. Both need only the nearest point of either kind.
     fn belongs(&self, place: usize, at: [f64; 2]) -> bool {
-        let (squared, label) = self.asked.nearest(at);
+        let (squared, label) = self.asked.nearest(at, f64::INFINITY);
         let nearest_is_taken = label == TAKEN;
         if !nearest_is_taken || !self.maxima[place] {
             return nearest_is_taken;

@@ -50,7 +50,8 @@ fn keep_within(view: &View<'_>, tops: &[Top], reach_m: f64, tree: &mut [u32]) {
 ///
 /// Local maxima within `window_m` of themselves are supposed to be tops. Squares of
 /// `params.block_m` that are fixed in the world are cut one by one, with surroundings of
-/// `params.reach_m`; a tree of two squares has the same highest point in both.
+/// `params.reach_m`. What two squares cut off is one tree where both find the same highest point in it;
+/// else it falls apart at their border.
 ///
 /// # Errors
 /// [`Error::Length`] when columns differ in length.

@@ -19,7 +19,8 @@ pub(super) struct Voxels {
 /// How far a top may lie above the points of its crown, m: a scan seldom meets the very top.
 const ABOVE_POINTS_M: f64 = 3.0;
 
-/// Voxels further apart than this, in columns and rows, and how alike those nearer are for it.
+/// How far apart voxels may be to be compared, in columns and rows, and how alike they are as far as
+/// the plane goes.
 type Kernel = Vec<([i64; 2], f64)>;
 
 impl Voxels {
