@@ -4,6 +4,7 @@ use crate::Error;
 use crate::csv_table::write_table;
 use crate::table::Column;
 use crate::tree::ply::Precision;
+use crate::tree::scene::Watertight;
 use crate::tree::{
     Model, cylinder_columns, glb, metrics, obj, order_columns, ply, recording, scene,
     taper_columns, treefile, treeqsm,
@@ -15,7 +16,6 @@ use std::path::Path;
 use timberline_artefact::kinds::{ModelFiles, Qsm, Skeletons, TreeCloud, TreeFile};
 use timberline_artefact::stage::{Context, InputSpec, Inputs, Stage, StageError, StageInfo};
 use timberline_artefact::{Facts, Kind, UnitKind};
-use timberline_solids::closed::Closed;
 use timberline_solids::tubes::Fineness;
 
 /// Parameters of the stage `tree-models`.
@@ -69,7 +69,7 @@ impl Stage for TreeModelsStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "tree-models",
-            version: 1,
+            version: 2,
             summary: "tables and meshes of one tree: QSM, TreeQSM columns, tree file, PLY, OBJ, glTF, MCAP",
             unit: UnitKind::Tree,
             inputs: INPUTS,
@@ -96,7 +96,7 @@ impl Stage for TreeModelsStage {
             let triangles = u64::from(params.watertight_triangles);
             scene::watertight(&model, triangles, params.watertight_cell_m)
         });
-        let closed = closed.filter(|closed| !closed.mesh.triangles.is_empty());
+        let closed = closed.filter(|closed| !closed.closed.mesh.triangles.is_empty());
         files.push(file("metrics.json", metrics::write(&model, closed.as_ref())?));
         files.extend(meshes(&model, params, closed.as_ref()));
         context.check_cancelled()?;
@@ -142,7 +142,7 @@ fn table<T>(
     Ok(file(name, bytes))
 }
 
-fn meshes(model: &Model<'_>, params: &Params, closed: Option<&Closed>) -> Vec<TreeFile> {
+fn meshes(model: &Model<'_>, params: &Params, closed: Option<&Watertight>) -> Vec<TreeFile> {
     let fineness = Fineness { sides: params.sides, step_m: params.step_m };
     let branches = scene::branches(model, fineness, 0.0);
     let notes = notes(model);
@@ -153,11 +153,11 @@ fn meshes(model: &Model<'_>, params: &Params, closed: Option<&Closed>) -> Vec<Tr
         file("tree.obj", obj::write(&branches, &notes).into_bytes()),
         file("tree.glb", glb::write(&[part], &extras(model))),
     ];
-    if let Some(closed) = closed {
+    if let Some(Watertight { closed, left_out }) = closed {
         let mut notes = notes;
         notes.push(format!(
-            "grid {} m: branches thinner than {} m are drawn with that radius",
-            closed.cell_m, closed.least_radius_m
+            "grid {} m: {left_out} pieces that are thinner are left out",
+            closed.cell_m
         ));
         let bytes = ply::write(&closed.mesh, &[], Precision::Single, &notes);
         files.push(file("tree_watertight.ply", bytes));

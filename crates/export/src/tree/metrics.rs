@@ -1,9 +1,9 @@
 //! `metrics.json`: all that is known about a tree, for programs.
 
 use super::Model;
+use super::scene::Watertight;
 use serde::Serialize;
 use timberline_artefact::kinds::{ConsolidationEffect, Distances, TreeMetrics};
-use timberline_solids::closed::Closed;
 
 #[derive(Serialize)]
 struct Document<'a> {
@@ -20,31 +20,33 @@ struct Document<'a> {
     cloud_to_model: &'a Distances,
     model_to_cloud: &'a Distances,
     consolidation: &'a ConsolidationEffect,
-    watertight: Option<Watertight>,
+    watertight: Option<Told>,
 }
 
-/// What the closed mesh is: on a grid, so that thin branches are thicker than in the model.
+/// What the closed mesh is: on a grid, so that the thinnest branches are not in it.
 #[derive(Serialize)]
-struct Watertight {
+struct Told {
     volume_m3: f64,
     triangles: usize,
     grid_edge_m: f64,
     least_radius_m: f64,
     thickened_pieces: u64,
+    left_out_pieces: u64,
 }
 
 /// The document; a value that is not known is `null`.
 ///
 /// # Errors
 /// What serde_json says; nothing here can make it.
-pub fn write(model: &Model<'_>, closed: Option<&Closed>) -> Result<Vec<u8>, serde_json::Error> {
+pub fn write(model: &Model<'_>, closed: Option<&Watertight>) -> Result<Vec<u8>, serde_json::Error> {
     let qsm = model.qsm;
-    let watertight = closed.map(|closed| Watertight {
+    let watertight = closed.map(|Watertight { closed, left_out }| Told {
         volume_m3: closed.mesh.volume_m3(),
         triangles: closed.mesh.triangles.len(),
         grid_edge_m: closed.cell_m,
         least_radius_m: closed.least_radius_m,
         thickened_pieces: closed.thickened,
+        left_out_pieces: *left_out,
     });
     let mut bytes = serde_json::to_vec_pretty(&Document {
         tree_id: qsm.tree_id,

@@ -49,12 +49,39 @@ pub fn branches(model: &Model<'_>, fineness: Fineness, least_radius_m: f64) -> V
     meshes
 }
 
-/// One closed surface around the whole tree with about so many triangles, see
-/// [`timberline_solids::closed`].
+/// One closed surface around a tree.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Watertight {
+    /// The surface.
+    pub closed: Closed,
+    /// Number of pieces that are too thin for its grid and left out.
+    pub left_out: u64,
+}
+
+/// One closed surface around the tree with about so many triangles, see [`timberline_solids::closed`].
+///
+/// Twigs that its grid cannot show are left out rather than drawn as thick as the grid: there are so many
+/// of them that they would make most of the volume.
 #[must_use]
-pub fn watertight(model: &Model<'_>, triangles: u64, finest_m: f64) -> Closed {
+pub fn watertight(model: &Model<'_>, triangles: u64, finest_m: f64) -> Watertight {
+    /// From one least radius to the next that is tried.
+    const STEP: f64 = 1.15;
     let all: Vec<Cylinder> = model.cylinders();
     let of_branch = |branch| cones_of(&axis_of(&all[model.places(branch)]));
     let cones: Vec<RoundCone> = model.qsm.branches.iter().flat_map(of_branch).collect();
-    closed(&cones, cell_for(&cones, triangles, finest_m))
+    let radius_m = |cone: &RoundCone| cone.start.1.max(cone.end.1);
+    let thickest_m = cones.iter().map(radius_m).fold(0.0, f64::max);
+    let mut least_m = finest_m;
+    loop {
+        let kept: Vec<RoundCone> =
+            cones.iter().filter(|cone| radius_m(cone) >= least_m).copied().collect();
+        let cell_m = cell_for(&kept, triangles, finest_m);
+        if cell_m <= least_m || STEP * least_m > thickest_m {
+            // A tree thinner than any grid is drawn as it can be.
+            let kept = if kept.is_empty() { &cones } else { &kept };
+            let left_out = (cones.len() - kept.len()) as u64;
+            return Watertight { closed: closed(kept, cell_m), left_out };
+        }
+        least_m *= STEP;
+    }
 }
