@@ -127,7 +127,8 @@ fn built_in(
     let segmenter = segmenter(params);
     let halo_m = needed_m(&*segmenter, params, &tile_rect(inputs)?);
     let points_m = if segmenter.is_local() { 0.0 } else { halo_m };
-    let all = gather(inputs, points_m, &[Aligned::Height])?;
+    let mut all = gather(inputs, points_m, &[Aligned::Height])?;
+    hide_noise(&mut all);
     let markers = markers(inputs, &all.tile_rect.grown(halo_m), &all.cloud.frame)?;
     context.check_cancelled()?;
     let claims = claims(&*segmenter, params, &all, &markers)?;
@@ -186,13 +187,12 @@ fn claims(
     let cloud = &all.cloud;
     // Files that do not count returns say 0.
     let is_first: Vec<bool> = cloud.return_number.iter().map(|number| *number <= 1).collect();
-    let height_m = heights(all);
     let view = View {
         frame: cloud.frame,
         x: &cloud.x,
         y: &cloud.y,
         z: &cloud.z,
-        height_m: &height_m,
+        height_m: &all.height_m,
         is_first: &is_first,
         markers,
     };
@@ -200,13 +200,11 @@ fn claims(
     segment_in_blocks(segmenter, &view, &own, params.block_m)
 }
 
-/// Heights above ground, unknown for what the scan says is noise: it has no tree and is no part of
-/// the canopy's surface. Noise is there only where the stage `tiles` was told to keep it.
-fn heights(all: &Surroundings) -> Vec<f32> {
-    let known = all.height_m.iter().zip(&all.cloud.classification);
-    known
-        .map(|(height_m, class)| if NOISE.contains(class) { f32::NAN } else { *height_m })
-        .collect()
+/// Forgets the heights of what the scan says is noise: it has no tree and is no part of the canopy's
+/// surface. Noise is there only where the stage `tiles` was told to keep it.
+fn hide_noise(all: &mut Surroundings) {
+    let classes = all.height_m.iter_mut().zip(&all.cloud.classification);
+    classes.filter(|(_, class)| NOISE.contains(class)).for_each(|(height, _)| *height = f32::NAN);
 }
 
 fn labels(claims: &[Claim]) -> Labels {
