@@ -192,7 +192,7 @@ fn refine(mut circle: Circle, points: &[SlicePoint], noise_m: f64) -> Circle {
 
 /// Whether a circle looks like a stem: enough of its circumference has points, its inside has few.
 fn is_stem(circle: &Circle, points: &[SlicePoint], params: &StemsParams) -> bool {
-    let (on, _, inside) = support(circle, points, params.noise_m);
+    let (on, inside) = support(circle, points, params.noise_m);
     let around =
         points.iter().filter(|p| circle.distance_from_centre_m(p) <= 1.5 * circle.radius_m).count();
     on.len() >= FEWEST
@@ -201,24 +201,22 @@ fn is_stem(circle: &Circle, points: &[SlicePoint], params: &StemsParams) -> bool
         && 2 * on.len() >= around
 }
 
-/// Points on the circle, and the numbers of points outside and inside it.
+/// Points on the circle, and the number of points inside it.
 fn support<'a>(
     circle: &Circle,
     points: &'a [SlicePoint],
     noise_m: f64,
-) -> (Vec<&'a SlicePoint>, usize, usize) {
-    let (mut on, mut outside, mut inside) = (Vec::new(), 0, 0);
+) -> (Vec<&'a SlicePoint>, usize) {
+    let (mut on, mut inside) = (Vec::new(), 0);
     for point in points {
         let distance_m = circle.distance_from_centre_m(point);
         if (distance_m - circle.radius_m).abs() <= noise_m {
             on.push(point);
-        } else if distance_m > circle.radius_m {
-            outside += 1;
         } else if distance_m < INSIDE * circle.radius_m {
             inside += 1;
         }
     }
-    (on, outside, inside)
+    (on, inside)
 }
 
 fn coverage(circle: &Circle, on: &[&SlicePoint]) -> f64 {
@@ -232,7 +230,7 @@ fn coverage(circle: &Circle, on: &[&SlicePoint]) -> f64 {
 }
 
 fn disc(slice: u32, points: &[SlicePoint], circle: &Circle, params: &StemsParams) -> Disc {
-    let (on, ..) = support(circle, points, params.noise_m);
+    let (on, _) = support(circle, points, params.noise_m);
     let z = on.iter().map(|point| point.z).sum::<f64>() / on.len().max(1) as f64;
     Disc {
         slice,

@@ -1,6 +1,7 @@
 //! Voxels and their neighbours.
 
 use crate::Error;
+use crate::joined::Joined;
 use rayon::prelude::*;
 use timberline_pointcloud::Nearest3;
 
@@ -165,31 +166,6 @@ fn shortest(
 
 fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
     (0..3).map(|axis| (a[axis] - b[axis]) * (a[axis] - b[axis])).sum::<f64>().sqrt()
-}
-
-/// Sets of indices that are joined one by one (Tarjan 1975, with path halving).
-struct Joined {
-    parent: Vec<u32>,
-}
-
-impl Joined {
-    fn new(len: usize) -> Self {
-        Self { parent: (0..len as u32).collect() }
-    }
-
-    fn root(&mut self, mut at: u32) -> u32 {
-        while self.parent[at as usize] != at {
-            self.parent[at as usize] = self.parent[self.parent[at as usize] as usize];
-            at = self.parent[at as usize];
-        }
-        at
-    }
-
-    /// The smaller root stays, so that the name of a set is its smallest index.
-    fn join(&mut self, a: u32, b: u32) {
-        let (a, b) = (self.root(a), self.root(b));
-        self.parent[a.max(b) as usize] = a.min(b);
-    }
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 
 use crate::chain::StemAxis;
 use crate::{Error, StemsParams, slices};
+use std::collections::BTreeSet;
 use timberline_pointcloud::Grid3;
 
 /// A stem whose first cross-section is not higher than this above ground stands by itself, m.
@@ -39,7 +40,7 @@ pub fn without_branches(
     let grid = Grid3::new(&column(0), &column(1), &column(2), LEAP_M)?;
     let woods = Woods { positions, height_m, grid };
     for axis in doubtful {
-        let hangs = kept.iter().any(|stem| woods.hangs_on(&axis, stem));
+        let hangs = woods.hangs_on_one(&axis, &kept);
         if !hangs && (has_ground || !woods.is_above_others(&axis)) {
             kept.push(axis);
         }
@@ -63,23 +64,24 @@ impl Woods<'_> {
         })
     }
 
-    /// Whether the first cross-section of `branch` is linked to `stem`.
-    fn hangs_on(&self, branch: &StemAxis, stem: &StemAxis) -> bool {
+    /// Whether the first cross-section of `branch` is linked to one of the stems.
+    fn hangs_on_one(&self, branch: &StemAxis, stems: &[StemAxis]) -> bool {
         let first = branch.discs[0];
         let [x, y, z] = first.centre_m;
-        let mut seen = vec![false; self.positions.len()];
-        let mut open = Vec::new();
-        self.grid.candidates(first.centre_m, first.radius_m + LEAP_M, |at| {
-            if !seen[at]
-                && distance_m(self.positions[at], first.centre_m) <= first.radius_m + LEAP_M
-            {
-                seen[at] = true;
+        let near: Vec<&StemAxis> = stems.iter().filter(|stem| comes_near(stem, [x, y])).collect();
+        if near.is_empty() {
+            return false;
+        }
+        let reach_m = first.radius_m + LEAP_M;
+        let (mut seen, mut open) = (BTreeSet::new(), Vec::new());
+        self.grid.candidates(first.centre_m, reach_m, |at| {
+            if distance_m(self.positions[at], first.centre_m) <= reach_m && seen.insert(at) {
                 open.push(at);
             }
         });
         while let Some(at) = open.pop() {
             let here = self.positions[at];
-            if stem_holds(stem, here) {
+            if near.iter().any(|stem| stem_holds(stem, here)) {
                 return true;
             }
             self.grid.candidates(here, LEAP_M, |to| {
@@ -88,14 +90,23 @@ impl Woods<'_> {
                 let inside = dx * dx + dy * dy <= REACH_M * REACH_M
                     && p[2] <= z + DETOUR_M
                     && self.height_m[to] >= LOW_M;
-                if !seen[to] && inside && distance_m(p, here) <= LEAP_M {
-                    seen[to] = true;
+                if inside && distance_m(p, here) <= LEAP_M && seen.insert(to) {
                     open.push(to);
                 }
             });
         }
         false
     }
+}
+
+/// Whether a way that stays within [`REACH_M`] of a place may lead to a stem.
+fn comes_near(stem: &StemAxis, [x, y]: [f64; 2]) -> bool {
+    // A stem leans at most 45 degrees over the gaps between its cross-sections.
+    let most_m = REACH_M + 1.5 + stem.radius_m() + LEAP_M;
+    stem.discs.iter().any(|disc| {
+        let (dx, dy) = (disc.centre_m[0] - x, disc.centre_m[1] - y);
+        dx * dx + dy * dy <= most_m * most_m
+    })
 }
 
 fn stem_holds(stem: &StemAxis, at: [f64; 3]) -> bool {

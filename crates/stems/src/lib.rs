@@ -14,6 +14,7 @@ pub mod disc;
 pub mod error;
 pub mod graph;
 pub mod grounded;
+mod joined;
 pub mod params;
 pub mod paths;
 pub mod slices;

@@ -9,6 +9,7 @@ use crate::slices::{SlicePoint, clusters};
 use crate::voxels::Voxels;
 use crate::{Error, StemAxis, StemsParams};
 use rayon::prelude::*;
+use std::collections::BTreeMap;
 use timberline_pointcloud::Frame;
 
 /// Fewest voxels of a scan with a tree.
@@ -109,7 +110,7 @@ pub fn trees(
         });
     }
     check_depth(&positions)?;
-    let clusters = clusters(slice_points, params)?;
+    let clusters = clusters(slice_points, params);
     let found: Vec<_> = clusters.par_iter().flat_map_iter(|one| discs(one, params)).collect();
     let foot_m = foot_m(voxels) - frame.origin_m[2] as f64;
     let scene = Scene { voxels, positions: &positions, frame, has_ground, foot_m, params };
@@ -160,6 +161,7 @@ struct Scene<'a> {
 }
 
 impl Scene<'_> {
+    /// Leaves out steep branches, see [`without_branches`].
     fn without_branches(&self, axes: Vec<StemAxis>) -> Result<Vec<StemAxis>, Error> {
         let all = 0..self.positions.len() as u32;
         let kept: Vec<u32> = all.filter(|&at| !self.is_ground(at)).collect();
@@ -188,7 +190,8 @@ impl Scene<'_> {
             // The label after the last tree is the undergrowth's.
             owner[at as usize] = if (label as usize) < axes.len() { label } else { UNREACHED };
         }
-        let trees = (0..).zip(axes).map(|(tree, axis)| self.tree(tree, axis, &owner)).collect();
+        let own = voxels_of(&owner, axes.len());
+        let trees = own.iter().zip(axes).map(|(own, axis)| self.tree(own, axis)).collect();
         Ok(self.without_saplings(Space { trees, owner }))
     }
 
@@ -230,15 +233,23 @@ impl Scene<'_> {
 
     /// The stem each voxel is on.
     fn on_stems(&self, axes: &[StemAxis]) -> Vec<Option<u32>> {
-        let on = |axis: &StemAxis, at: &[f64; 3]| {
+        let below_m = self.params.search_from_m + self.params.slice_m + BARK_M;
+        let reach_m = |axis: &StemAxis| axis.radius_m() + BARK_M + self.voxels.edge_m() / 2.0;
+        let reaches_m: Vec<f64> = axes.iter().map(reach_m).collect();
+        // No stem leans more than 45 degrees.
+        let widest_m = reaches_m.iter().copied().fold(0.0, f64::max) + below_m;
+        let columns = Columns::new(axes, widest_m);
+        let on = |stem: u32, at: &[f64; 3]| {
+            let (axis, reach_m) = (&axes[stem as usize], reaches_m[stem as usize]);
             let [low, high] = axis.span_m();
-            let below_m = self.params.search_from_m + self.params.slice_m + BARK_M;
-            let reach_m = axis.radius_m() + BARK_M + self.voxels.edge_m() / 2.0;
-            let [x, y] = axis.at_elevation(at[2]);
-            let (dx, dy) = (at[0] - x, at[1] - y);
-            at[2] >= low - below_m && at[2] <= high && dx * dx + dy * dy <= reach_m * reach_m
+            let near = || {
+                let [x, y] = axis.at_elevation(at[2]);
+                let (dx, dy) = (at[0] - x, at[1] - y);
+                dx * dx + dy * dy <= reach_m * reach_m
+            };
+            at[2] >= low - below_m && at[2] <= high && near()
         };
-        let stem = |at: &[f64; 3]| (0..).zip(axes).find(|(_, axis)| on(axis, at)).map(|(i, _)| i);
+        let stem = |at: &[f64; 3]| columns.near(at).iter().copied().find(|&stem| on(stem, at));
         self.positions.par_iter().map(stem).collect()
     }
 
@@ -259,9 +270,9 @@ impl Scene<'_> {
         kept.iter().enumerate().filter_map(source).collect()
     }
 
-    fn tree(&self, tree: u32, axis: StemAxis, owner: &[u32]) -> Tree {
-        let z_m = self.base_elevation_m(tree, &axis, owner);
-        let foot = if self.has_ground { None } else { self.foot(tree, owner, z_m) };
+    fn tree(&self, own: &[u32], axis: StemAxis) -> Tree {
+        let z_m = self.base_elevation_m(own, &axis);
+        let foot = if self.has_ground { None } else { self.foot(own, z_m) };
         let [x, y] = foot.unwrap_or_else(|| axis.at_elevation(z_m));
         let base_m = self.frame.world_from_local([x, y, z_m]);
         let dbh_m = axis.diameter_at(BREAST_HEIGHT_M, self.params);
@@ -270,10 +281,9 @@ impl Scene<'_> {
 
     /// Middle of a tree's lowest voxels in the plane, where they lie close together: nearer to the
     /// base than a stem's line from far above.
-    fn foot(&self, tree: u32, owner: &[u32], z_m: f64) -> Option<[f64; 2]> {
-        let own = (0..owner.len()).filter(|&at| owner[at] == tree);
-        let low: Vec<[f64; 3]> =
-            own.map(|at| self.positions[at]).filter(|p| p[2] <= z_m + FOOT_HEIGHT_M).collect();
+    fn foot(&self, own: &[u32], z_m: f64) -> Option<[f64; 2]> {
+        let positions = own.iter().map(|&at| self.positions[at as usize]);
+        let low: Vec<[f64; 3]> = positions.filter(|p| p[2] <= z_m + FOOT_HEIGHT_M).collect();
         let range = |axis: usize| {
             let values = || low.iter().map(|p| p[axis]);
             (values().fold(f64::INFINITY, f64::min), values().fold(f64::NEG_INFINITY, f64::max))
@@ -289,8 +299,8 @@ impl Scene<'_> {
     }
 
     /// Elevation of the ground at a stem, or of a tree's lowest voxels, in the frame.
-    fn base_elevation_m(&self, tree: u32, axis: &StemAxis, owner: &[u32]) -> f64 {
-        let own = (0..owner.len()).filter(|&at| owner[at] == tree);
+    fn base_elevation_m(&self, own: &[u32], axis: &StemAxis) -> f64 {
+        let own = own.iter().map(|&at| at as usize);
         let up_m = self.frame.origin_m[2] as f64;
         if !self.has_ground {
             let lowest = own.map(|at| self.positions[at][2]).fold(f64::INFINITY, f64::min);
@@ -333,5 +343,55 @@ impl Scene<'_> {
         let base_m = self.frame.world_from_local(base);
         let tree = Tree { base_m, on_ground: false, dbh_m: None, axis: None };
         Ok(Space { trees: vec![tree], owner })
+    }
+}
+
+/// Places of the voxels of each of `trees` trees.
+fn voxels_of(owner: &[u32], trees: usize) -> Vec<Vec<u32>> {
+    let mut own = vec![Vec::new(); trees];
+    for (at, tree) in (0..).zip(owner) {
+        if let Some(own) = own.get_mut(*tree as usize) {
+            own.push(at);
+        }
+    }
+    own
+}
+
+/// Stems by the columns of the plot that they lie in.
+struct Columns {
+    stems: BTreeMap<[i32; 2], Vec<u32>>,
+}
+
+impl Columns {
+    /// Edge of a column, m.
+    const EDGE_M: f64 = 1.0;
+
+    /// Puts every stem into the columns within `reach_m` of its cross-sections.
+    fn new(axes: &[StemAxis], reach_m: f64) -> Self {
+        let mut stems: BTreeMap<[i32; 2], Vec<u32>> = BTreeMap::new();
+        for (stem, axis) in (0..).zip(axes) {
+            for disc in &axis.discs {
+                let [x, y, _] = disc.centre_m;
+                let [low, high] = [-reach_m, reach_m].map(|by| Self::column(x + by, y + by));
+                for column in
+                    (low[0]..=high[0]).flat_map(|i| (low[1]..=high[1]).map(move |j| [i, j]))
+                {
+                    let known = stems.entry(column).or_default();
+                    if known.last() != Some(&stem) {
+                        known.push(stem);
+                    }
+                }
+            }
+        }
+        Self { stems }
+    }
+
+    fn column(x: f64, y: f64) -> [i32; 2] {
+        [x, y].map(|value| (value / Self::EDGE_M).floor() as i32)
+    }
+
+    /// The stems that may be near a position, ascending.
+    fn near(&self, at: &[f64; 3]) -> &[u32] {
+        self.stems.get(&Self::column(at[0], at[1])).map_or(&[], Vec::as_slice)
     }
 }
