@@ -69,6 +69,18 @@ pub struct Column<T = Tree> {
     pub value: fn(&T, &Crs) -> Value,
 }
 
+/// A column, as a line of a table of columns.
+pub(crate) const fn column<T>(
+    name: &'static str,
+    kind: Kind,
+    unit: Unit,
+    range: &'static str,
+    meaning: &'static str,
+    value: fn(&T, &Crs) -> Value,
+) -> Column<T> {
+    Column { name, kind, unit, meaning, range, value }
+}
+
 impl<T> Clone for Column<T> {
     fn clone(&self) -> Self {
         *self

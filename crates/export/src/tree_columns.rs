@@ -1,19 +1,7 @@
 //! The columns of the tree table.
 
-use crate::table::{Column, Kind, Unit, Value};
-use timberline_artefact::Crs;
+use crate::table::{Column, Kind, Unit, Value, column};
 use timberline_artefact::kinds::{CrownShape, CrownStatus, Tree, TreeFlag};
-
-const fn column(
-    name: &'static str,
-    kind: Kind,
-    unit: Unit,
-    range: &'static str,
-    meaning: &'static str,
-    value: fn(&Tree, &Crs) -> Value,
-) -> Column {
-    Column { name, kind, unit, meaning, range, value }
-}
 
 /// Metres with two decimals.
 const METRES: Kind = Kind::Real(2);
@@ -352,6 +340,7 @@ fn status(status: CrownStatus) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use timberline_artefact::Crs;
     use timberline_artefact::kinds::PositionMethod;
 
     #[test]

@@ -1,8 +1,7 @@
 //! The columns of `qsm.csv`.
 
 use super::Model;
-use crate::table::{Column, Kind, Unit, Value};
-use timberline_artefact::Crs;
+use crate::table::{Column, Kind, Unit, Value, column};
 use timberline_artefact::kinds::QsmCylinder;
 use timberline_solids::vector::distance;
 
@@ -40,17 +39,6 @@ pub fn rows<'a>(model: &Model<'a>) -> impl Iterator<Item = CylinderRow> + 'a {
             position: branch.map_or(0, |branch| place.saturating_sub(branch.first) + 1),
         }
     })
-}
-
-const fn column(
-    name: &'static str,
-    kind: Kind,
-    unit: Unit,
-    range: &'static str,
-    meaning: &'static str,
-    value: fn(&CylinderRow, &Crs) -> Value,
-) -> Column<CylinderRow> {
-    Column { name, kind, unit, meaning, range, value }
 }
 
 /// Positions to a micrometre: finer than any scanner, coarser than the last bit of a world coordinate.

@@ -1,8 +1,7 @@
 //! The columns of `taper.csv`.
 
 use super::Model;
-use crate::table::{Column, Kind, Unit, Value};
-use timberline_artefact::Crs;
+use crate::table::{Column, Kind, Unit, Value, column};
 use timberline_artefact::kinds::TaperStep;
 
 /// A row: the stem of a tree at a height.
@@ -18,17 +17,6 @@ pub struct TaperRow {
 pub fn rows<'a>(model: &Model<'a>) -> impl Iterator<Item = TaperRow> + 'a {
     let qsm = model.qsm;
     qsm.metrics.taper.iter().map(move |step| TaperRow { tree_id: qsm.tree_id, step: *step })
-}
-
-const fn column(
-    name: &'static str,
-    kind: Kind,
-    unit: Unit,
-    range: &'static str,
-    meaning: &'static str,
-    value: fn(&TaperRow, &Crs) -> Value,
-) -> Column<TaperRow> {
-    Column { name, kind, unit, meaning, range, value }
 }
 
 /// The columns.

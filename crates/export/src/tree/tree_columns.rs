@@ -2,7 +2,7 @@
 
 use super::Model;
 use crate::gpkg::{Geometry, Layer};
-use crate::table::{Column, Kind, Unit, Value};
+use crate::table::{Column, Kind, Unit, Value, column};
 use timberline_artefact::Crs;
 use timberline_artefact::kinds::{
     BaseSource, ConsolidationEffect, Dbh, Distances, RadiusSource, TreeMetrics,
@@ -64,17 +64,6 @@ impl TreeRow {
     fn of_distances(distances: &Distances, value: f64) -> Value {
         Value::Real(if distances.count > 0 { value } else { f64::NAN })
     }
-}
-
-const fn column(
-    name: &'static str,
-    kind: Kind,
-    unit: Unit,
-    range: &'static str,
-    meaning: &'static str,
-    value: fn(&TreeRow, &Crs) -> Value,
-) -> Column<TreeRow> {
-    Column { name, kind, unit, meaning, range, value }
 }
 
 const fn size(
