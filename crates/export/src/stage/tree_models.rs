@@ -35,7 +35,7 @@ pub struct Params {
     /// that mesh out.
     #[schemars(range(min = 0, max = 20_000_000))]
     pub watertight_triangles: u32,
-    /// Smallest edge of that grid. Branches thinner than 0.87 edges are left out.
+    /// Smallest edge of that grid. Pieces of branches with a radius below the edge are left out.
     #[schemars(range(min = 0.001, max = 0.5), extend("x-unit" = "m"))]
     pub watertight_cell_m: f64,
     /// Write `tree.mcap`.
