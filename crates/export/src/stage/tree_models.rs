@@ -22,7 +22,7 @@ use timberline_solids::tubes::Fineness;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Corners of a tube's cross-section.
+    /// Corners of a tube's cross-section; twigs thinner than 2 cm have half as many.
     #[schemars(range(min = 3, max = 64), extend("x-source" = "Du et al. 2019, 10"))]
     pub sides: u32,
     /// Longest step along a tube's axis.

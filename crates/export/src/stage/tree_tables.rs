@@ -29,7 +29,7 @@ use timberline_solids::vector::add;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Params {
-    /// Corners of a tube's cross-section in the mesh of the plot.
+    /// Corners of a tube's cross-section in the mesh of the plot; twigs thinner than 2 cm have half as many.
     #[schemars(range(min = 3, max = 64))]
     pub plot_sides: u32,
     /// Longest step along a tube's axis there.

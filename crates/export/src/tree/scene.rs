@@ -6,6 +6,9 @@ use timberline_solids::closed::{Closed, RoundCone, cell_for, closed, cones_of};
 use timberline_solids::tubes::{Fineness, axis_of, tube};
 use timberline_solids::{Cylinder, Mesh};
 
+/// Branches nowhere thicker than this are twigs, m: a picture of the whole tree has a few pixels for them.
+const TWIG_RADIUS_M: f64 = 0.01;
+
 /// The tube of one branch.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BranchMesh {
@@ -38,7 +41,7 @@ pub fn branches(model: &Model<'_>, fineness: Fineness, least_radius_m: f64) -> V
         let places = model.places(branch);
         let thick = all[places.clone()].iter().take_while(|c| c.radius_m >= least_radius_m).count();
         let places = places.start..places.start + thick;
-        let tubes = tube(&all[places.clone()], fineness);
+        let tubes = tube(&all[places.clone()], fineness_of(&all[places.clone()], fineness));
         if tubes.mesh.triangles.is_empty() {
             continue;
         }
@@ -47,6 +50,13 @@ pub fn branches(model: &Model<'_>, fineness: Fineness, least_radius_m: f64) -> V
         meshes.push(BranchMesh { order: branch.order, mesh: tubes.mesh, source });
     }
     meshes
+}
+
+/// Twigs have half the corners of thicker branches, and no fewer than three: most of a tree's mesh is twigs.
+fn fineness_of(branch: &[Cylinder], fineness: Fineness) -> Fineness {
+    let thickest_m = branch.iter().map(|cylinder| cylinder.radius_m).fold(0.0, f64::max);
+    let sides = if thickest_m < TWIG_RADIUS_M { fineness.sides / 2 } else { fineness.sides };
+    Fineness { sides: sides.max(3), ..fineness }
 }
 
 /// One closed surface around a tree.
