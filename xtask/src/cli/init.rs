@@ -23,9 +23,9 @@ pub struct Args {
     /// Name of the campaign [default: that of the folder]
     #[arg(long)]
     name: Option<String>,
-    /// How the scans were taken
-    #[arg(long, value_parser = ["als", "uls", "tls", "mls"], default_value = "als")]
-    platform: String,
+    /// How the scans were taken [default: tls from 1000 points per m2 on, als below]
+    #[arg(long, value_parser = ["als", "uls", "tls", "mls"])]
+    platform: Option<String>,
     /// Overwrite a campaign.toml that is there
     #[arg(long)]
     force: bool,
@@ -34,6 +34,9 @@ pub struct Args {
 /// Endings of point clouds. Files of the last three are often something else.
 const ENDINGS: [&str; 10] = ["las", "laz", "e57", "ply", "pcd", "pts", "xyz", "txt", "asc", "csv"];
 const OFTEN_OTHER: [&str; 3] = ["txt", "asc", "csv"];
+
+/// Scans from the air have tens to a few hundred points per m2, scans from the ground many thousands.
+const DENSITY_OF_TERRESTRIAL: f64 = 1000.0;
 
 struct Scan {
     /// As it stands in the campaign file.
@@ -62,13 +65,16 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
     }
     std::fs::create_dir_all(&args.folder)
         .with_context(|| format!("cannot make {}", args.folder.display()))?;
-    write_atomic(&target, text(args, &scans)?.as_bytes())?;
+    let platform = platform(args, &scans)?;
+    write_atomic(&target, text(args, platform, &scans)?.as_bytes())?;
     report(&scans);
     out::line(&target.display().to_string());
-    out::talk(&format!(
-        "next: cargo xtask run pipelines/als-inventory.toml --campaign {}",
-        args.folder.display()
-    ));
+    let pipeline = match platform {
+        Platform::Als | Platform::Uls => "als-inventory",
+        Platform::Tls | Platform::Mls => "tls-trees",
+    };
+    let folder = args.folder.display();
+    out::talk(&format!("next: cargo xtask run pipelines/{pipeline}.toml --campaign {folder}"));
     Ok(DONE)
 }
 
@@ -124,11 +130,21 @@ fn report(scans: &[Scan]) {
     }
 }
 
-fn text(args: &Args, scans: &[Scan]) -> Result<String> {
+/// What the arguments say, or what the density of the scans tells.
+fn platform(args: &Args, scans: &[Scan]) -> Result<Platform> {
+    if let Some(platform) = &args.platform {
+        return Ok(serde_json::from_value(platform.as_str().into())?);
+    }
+    let known = scans.iter().filter_map(|scan| scan.facts.as_ref().ok()?.density_per_m2);
+    let densest = known.fold(0.0, f64::max);
+    let platform = if densest >= DENSITY_OF_TERRESTRIAL { Platform::Tls } else { Platform::Als };
+    Ok(platform)
+}
+
+fn text(args: &Args, platform: Platform, scans: &[Scan]) -> Result<String> {
     let folder = args.folder.canonicalize().unwrap_or_else(|_| args.folder.clone());
     let own_name = folder.file_name().map(|name| name.to_string_lossy().into_owned());
     let name = args.name.clone().or(own_name).unwrap_or_else(|| "campaign".to_owned());
-    let platform: Platform = serde_json::from_value(args.platform.as_str().into())?;
     let platform = serde_json::to_value(platform)?;
     let mut text = format!(
         "name = {}\nplatform = {platform}\ninputs = {}",
@@ -217,20 +233,35 @@ mod tests {
         Scan { pattern: pattern.to_owned(), facts }
     }
 
+    fn no_arguments() -> Args {
+        let (folder, scans) = (PathBuf::new(), Vec::new());
+        Args { folder, scans, name: None, platform: None, force: false }
+    }
+
     #[test]
     fn tables_are_excluded_only_where_a_glob_names_them() {
-        let args = Args {
-            folder: PathBuf::new(),
-            scans: Vec::new(),
-            name: None,
-            platform: "tls".to_owned(),
-            force: false,
-        };
+        let args = no_arguments();
         let table = || scan("trees.csv", false);
         assert_eq!(excluded(&args, &[scan("a.xyz", true), table()]), "");
         let listed = excluded(&args, &[scan("a.csv", true), table()]);
         assert!(listed.contains("exclude = [\n    \"trees.csv\",\n]"), "{listed}");
         assert!(excluded(&args, &[scan("a.xyz", true), scan("b.e57", false)]).contains("b.e57"));
+    }
+
+    #[test]
+    fn dense_scans_are_terrestrial_unless_told_otherwise() {
+        let of = |density: Option<f64>, platform: Option<&str>| {
+            let mut one = scan("a.laz", true);
+            if let Ok(facts) = &mut one.facts {
+                facts.density_per_m2 = density;
+            }
+            let args = Args { platform: platform.map(str::to_owned), ..no_arguments() };
+            super::platform(&args, &[one]).unwrap()
+        };
+        assert_eq!(of(None, None), Platform::Als);
+        assert_eq!(of(Some(40.0), None), Platform::Als);
+        assert_eq!(of(Some(6000.0), None), Platform::Tls);
+        assert_eq!(of(Some(6000.0), Some("mls")), Platform::Mls);
     }
 
     #[test]
