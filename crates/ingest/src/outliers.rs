@@ -53,52 +53,54 @@ impl Outliers {
         let at: Vec<[f64; 3]> = (0..cloud.len()).map(|index| cloud.local(index)).collect();
         let tree = Nearest3::new(&at).map_err(|error| Error::Params(error.to_string()))?;
         let near = own.grown(self.reach_m);
-        let within = |rect: &Rect, index: usize| {
+        let around = |index: usize| {
             let [x, y, _] = cloud.world(index);
-            x >= rect.min[0] && x <= rect.max[0] && y >= rect.min[1] && y <= rect.max[1]
+            if near.contains(x, y) { self.around(&tree, &at, index) } else { self.nothing() }
         };
-        let mean = |index: usize| {
-            if within(&near, index) { self.mean_m(&tree, &at, index) } else { self.reach_m }
-        };
-        let means: Vec<f64> = (0..at.len()).into_par_iter().map(mean).collect();
+        let all: Vec<Around> = (0..at.len()).into_par_iter().map(around).collect();
         let is_outlier = |index: &u32| {
-            let index = *index as usize;
-            let [x, y, _] = cloud.world(index);
-            own.contains(x, y) && self.is_outlier(&tree, &at, &means, index)
+            let [x, y, _] = cloud.world(*index as usize);
+            own.contains(x, y) && self.is_outlier(&all, *index as usize)
         };
         Ok((0..at.len() as u32).into_par_iter().filter(is_outlier).collect())
     }
 
-    /// The nearest other points within reach: index and distance, metres.
-    fn nearest(&self, tree: &Nearest3, at: &[[f64; 3]], index: usize) -> Vec<(usize, f64)> {
-        let found = tree.nearest(&at[index], self.neighbours + 1);
-        let mut others: Vec<(usize, f64)> = found
-            .into_iter()
-            .filter(|neighbour| neighbour.index != index)
-            .map(|neighbour| (neighbour.index, neighbour.squared_m2.sqrt()))
-            .filter(|(_, distance_m)| *distance_m <= self.reach_m)
-            .collect();
-        // Among many points of one place the point itself may not be found.
-        others.truncate(self.neighbours);
-        others
+    /// A point with no other within reach.
+    fn nothing(&self) -> Around {
+        Around { mean_m: self.reach_m, others: Vec::new() }
     }
 
-    fn mean_m(&self, tree: &Nearest3, at: &[[f64; 3]], index: usize) -> f64 {
-        let near = self.nearest(tree, at, index);
+    fn around(&self, tree: &Nearest3, at: &[[f64; 3]], index: usize) -> Around {
+        let found = tree.nearest(&at[index], self.neighbours + 1).into_iter();
+        let near = found
+            .filter(|other| other.index != index)
+            .map(|other| (other.index as u32, other.squared_m2.sqrt()))
+            .filter(|(_, distance_m)| *distance_m <= self.reach_m);
+        // Among many points of one place the point itself may not be found.
+        let near: Vec<(u32, f64)> = near.take(self.neighbours).collect();
         let missing = (self.neighbours - near.len()) as f64 * self.reach_m;
         let sum: f64 = near.iter().map(|(_, distance_m)| distance_m).sum();
-        (sum + missing) / self.neighbours as f64
+        let mean_m = (sum + missing) / self.neighbours as f64;
+        Around { mean_m, others: near.into_iter().map(|(other, _)| other).collect() }
     }
 
-    fn is_outlier(&self, tree: &Nearest3, at: &[[f64; 3]], means: &[f64], index: usize) -> bool {
-        let near = self.nearest(tree, at, index);
-        if 2 * near.len() < self.neighbours {
+    fn is_outlier(&self, all: &[Around], index: usize) -> bool {
+        let Around { mean_m, others } = &all[index];
+        if 2 * others.len() < self.neighbours {
             return true;
         }
-        let mut around: Vec<f64> = near.iter().map(|(other, _)| means[*other]).collect();
-        around.sort_by(f64::total_cmp);
-        means[index] > self.factor * around[around.len() / 2].max(SMALLEST_SPACING_M)
+        let mut means: Vec<f64> = others.iter().map(|&other| all[other as usize].mean_m).collect();
+        means.sort_by(f64::total_cmp);
+        *mean_m > self.factor * means[means.len() / 2].max(SMALLEST_SPACING_M)
     }
+}
+
+/// What a point has around it.
+struct Around {
+    /// Mean distance to the nearest other points, m; those beyond reach count as the reach.
+    mean_m: f64,
+    /// Those within reach.
+    others: Vec<u32>,
 }
 
 #[cfg(test)]
