@@ -77,8 +77,8 @@ impl Stage for TreeTablesStage {
         }
     }
 
-    /// The rows of all trees and the mesh of the plot. How many trees there are is not known here: a
-    /// terrestrial tree has 10,000 points or more.
+    /// The mesh of the plot, and the files of one tree at a time. How many trees there are is not known
+    /// here: a terrestrial tree has 10,000 points or more.
     fn memory_bytes(_params: &Params, points: u64) -> u64 {
         const BYTES_PER_POINT: u64 = 100;
         const ONE_TREE: u64 = 300 << 20;
@@ -88,7 +88,7 @@ impl Stage for TreeTablesStage {
     fn run(params: &Params, inputs: &Inputs, context: &Context<'_>) -> Result<(), StageError> {
         let mut folder = OutputFolder::open(context.outputs_folder(), NAME)?;
         let plot = Plot::of(params, inputs, context)?;
-        plot.write_tables(context, &mut folder)?;
+        plot.write_tables(inputs, context, &mut folder)?;
         plot.write_meshes(&mut folder)?;
         let mut unpacked = 0;
         for file in inputs.files_of(ModelFiles::NAME) {
@@ -140,7 +140,7 @@ struct Plot {
     located: Facts,
     origin: Frame,
     trees: Vec<TreeRow>,
-    cylinders: Vec<CylinderRow>,
+    cylinders: usize,
     taper: Vec<TaperRow>,
     orders: Vec<OrderRow>,
     parts: Vec<glb::Part>,
@@ -187,7 +187,7 @@ impl Plot {
         let crs = self.located.crs.clone().unwrap_or_default();
         let model = Model { qsm, frame, crs: &crs };
         self.trees.push(TreeRow::of(&model));
-        self.cylinders.extend(cylinder_columns::rows(&model));
+        self.cylinders += qsm.cylinders.len();
         self.taper.extend(taper_columns::rows(&model));
         self.orders.extend(order_columns::rows(&model));
         let branches = scene::branches(&model, fineness, least_radius_m);
@@ -213,7 +213,7 @@ impl Plot {
             ("trees", self.trees.len()),
             ("trees found", found.len().max(self.trees.len())),
             ("trees without a model", lost.len()),
-            ("cylinders", self.cylinders.len()),
+            ("cylinders", self.cylinders),
         ];
         self.totals = totals.map(|(name, value)| (name.to_owned(), value as u64)).into();
     }
@@ -231,14 +231,16 @@ impl Plot {
 
     fn write_tables(
         &self,
+        inputs: &Inputs,
         context: &Context<'_>,
         folder: &mut OutputFolder,
     ) -> Result<(), StageError> {
         let crs = &self.crs;
-        table(folder, "trees", tree_columns::COLUMNS, crs, self.trees.iter().cloned())?;
-        table(folder, "qsm", cylinder_columns::COLUMNS, crs, self.cylinders.iter().copied())?;
-        table(folder, "taper", taper_columns::COLUMNS, crs, self.taper.iter().copied())?;
-        table(folder, "branches", order_columns::COLUMNS, crs, self.orders.iter().copied())?;
+        table(folder, "trees", tree_columns::COLUMNS, crs, self.trees.iter().cloned().map(Ok))?;
+        table(folder, "qsm", cylinder_columns::COLUMNS, crs, all_cylinders(inputs, crs))?;
+        table(folder, "taper", taper_columns::COLUMNS, crs, self.taper.iter().copied().map(Ok))?;
+        let orders = self.orders.iter().copied().map(Ok);
+        table(folder, "branches", order_columns::COLUMNS, crs, orders)?;
         let mut package = GeoPackage::create(&folder.file("trees.gpkg"), crs)?;
         package.add_layer(&STEMS, &mut self.trees.iter().cloned().map(Ok))?;
         let mut rows = vec![
@@ -284,17 +286,29 @@ impl Plot {
     }
 }
 
+/// The cylinders of all trees, read tree by tree: those of hundreds of trees are gigabytes.
+fn all_cylinders(inputs: &Inputs, crs: &Crs) -> impl Iterator<Item = Result<CylinderRow, Error>> {
+    inputs.each::<Qsm>().flat_map(|model| match model {
+        Ok((_, header, qsm)) => {
+            let frame = header.facts.frame.unwrap_or_default();
+            let model = Model { qsm: &qsm, frame, crs };
+            cylinder_columns::rows(&model).map(Ok).collect()
+        }
+        Err(error) => vec![Err(error.into())],
+    })
+}
+
 /// Writes a table and its dictionary.
 fn table<T>(
     folder: &mut OutputFolder,
     stem: &str,
     columns: &[Column<T>],
     crs: &Crs,
-    rows: impl Iterator<Item = T>,
+    rows: impl Iterator<Item = Result<T, Error>>,
 ) -> Result<(), Error> {
     let path = folder.file(&format!("{stem}.csv"));
     let out = BufWriter::new(File::create(&path).map_err(Error::io(&path, "create"))?);
-    write_table(out, &path, columns, crs, rows.map(Ok))?;
+    write_table(out, &path, columns, crs, rows)?;
     let path = folder.file(&format!("{stem}.dictionary.csv"));
     let out = BufWriter::new(File::create(&path).map_err(Error::io(&path, "create"))?);
     write_dictionary_of(out, &path, columns, crs)
