@@ -7,6 +7,7 @@
 use crate::Error;
 use crate::params::{GroundParams, Returns, Source};
 use crate::ptd::{densify, on_ground};
+use crate::thin::lowest_per_cell;
 use rayon::prelude::*;
 use std::collections::BTreeSet;
 use timberline_pointcloud::{Grid2, PointCloud, Rect};
@@ -131,6 +132,7 @@ impl Block {
         let candidates: Vec<usize> = (0..self.indices.len())
             .filter(|&place| may_be_ground(cloud, self.indices[place], params.returns))
             .collect();
+        let candidates = lowest_per_cell(candidates, &self.positions, params.thin_m);
         let points: Vec<[f64; 3]> = candidates.iter().map(|&place| self.positions[place]).collect();
         let vertices = densify(&points, self.edge_m, params)?;
         let on = on_ground(&points, &vertices, self.edge_m, params.tolerance_m)?;

@@ -41,6 +41,7 @@ pub mod quadtree;
 mod rim;
 pub mod stage;
 pub mod surface;
+mod thin;
 pub mod tin;
 pub mod tuning;
 

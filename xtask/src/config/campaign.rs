@@ -98,7 +98,8 @@ pub struct CrsFile {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TilesFile {
-    /// Points a tile should hold about, where `edge_m` is not given [default: 150000].
+    /// Points a tile should hold about, where `edge_m` is not given [default: 150000; 500000 of scans
+    /// from the ground].
     #[schemars(range(min = 1000, max = 100_000_000))]
     pub points: Option<u32>,
     /// Edge of a tile.

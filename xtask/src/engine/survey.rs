@@ -1,7 +1,7 @@
 //! A first look at the raw files: contents, extent, and the grid of tiles that follows from them.
 
 use super::notes::{Notes, Stamp, content_hash};
-use crate::config::{Campaign, campaign::CrsFile};
+use crate::config::{Campaign, Platform, campaign::CrsFile};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -12,6 +12,10 @@ use timberline_pointcloud::{Rect, TileGrid, TileId};
 
 /// Points of a tile unless the campaign says otherwise: the block of Tittmann et al. 2011, section 3.
 pub const TILE_POINTS: u32 = 150_000;
+
+/// The same for scans from the ground, whose tiles would be a few metres wide: what is around a tile would
+/// be most of what is read.
+const TERRESTRIAL_TILE_POINTS: u32 = 500_000;
 
 /// What the header of a raw file says.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -154,7 +158,11 @@ fn layout(
     let grid = if facts.is_empty() {
         None
     } else {
-        let points = tiles.points.unwrap_or(TILE_POINTS);
+        let usual = match campaign.file.platform {
+            Platform::Als | Platform::Uls => TILE_POINTS,
+            Platform::Tls | Platform::Mls => TERRESTRIAL_TILE_POINTS,
+        };
+        let points = tiles.points.unwrap_or(usual);
         let edge = tiles.edge_m.unwrap_or_else(|| surveyor.tile_edge_m(&facts, points));
         Some(
             TileGrid::new(edge, tiles.origin_m.unwrap_or([0, 0]))
