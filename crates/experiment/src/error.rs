@@ -74,6 +74,9 @@ pub enum Error {
     /// A fit failed.
     #[error(transparent)]
     Crowns(#[from] timberline_crowns::Error),
+    /// Points could not be consolidated.
+    #[error(transparent)]
+    Consolidation(#[from] timberline_wlop::Error),
     /// The neighbour search could not be built.
     #[error(transparent)]
     Search(#[from] timberline_pointcloud::nearest::BuildError),

@@ -10,7 +10,8 @@ use timberline_pointcloud::order::morton;
 
 /// Thickness and distances are measured at about this many places, evenly spread over the points.
 const QUERIES: usize = 20_000;
-/// How far around such a place the surface is fitted, over h.
+/// How far around such a place the surface is fitted, over h or the radius of the branch, whichever is
+/// smaller: farther around a branch there is no surface, and harm would not be seen.
 const QUERY_RADIUS_RATIO: f64 = 0.75;
 /// Where fewer than this share of a tree's points can be moved, it is skipped.
 const FEWEST_MOVED: f64 = 0.1;
@@ -219,7 +220,8 @@ impl Cloud {
         let step = could.len().div_ceil(QUERIES).max(1);
         let query = |&origin: &u32| Query {
             at_m: self.points[origin as usize],
-            radius_m: QUERY_RADIUS_RATIO * radii.h_m[origin as usize],
+            radius_m: QUERY_RADIUS_RATIO
+                * radii.h_m[origin as usize].min(radii.branch_m[origin as usize]),
             origin,
         };
         could.iter().step_by(step).map(query).collect()

@@ -26,7 +26,7 @@ impl Stage for ConsolidationStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "consolidation",
-            version: 1,
+            version: 2,
             summary: "points of a tree moved onto its surface: weighted locally optimal projection (Huang et al. 2009)",
             unit: UnitKind::Tree,
             inputs: INPUTS,

@@ -1,6 +1,7 @@
 //! Consolidation on shapes whose surface is known, and on input that is no tree.
 #![allow(
     clippy::unwrap_used,
+    clippy::panic,
     clippy::print_stdout,
     reason = "a test may stop at what it did not expect, and tells what it measured"
 )]
@@ -107,9 +108,15 @@ fn too_large_a_radius_is_noticed_and_undone() {
         branch_radius_share: 3.0,
         ..ConsolidationParams::default()
     };
+    // Three radii of the trunk wide, the operator draws its points together at its axis.
     let done = run(&points, &wide);
-    let worst = done.effect.distance_after_m > done.effect.distance_before_m;
-    assert!(!worst || matches!(done.skipped, Some(Skipped::Farther { .. })), "{:?}", done.effect);
+    let Some(Skipped::Farther { before_m, after_m }) = done.skipped else {
+        panic!("{:?} {:?}", done.skipped, done.effect)
+    };
+    assert!(after_m > 1.2 * before_m && done.positions_m.is_empty(), "{before_m} {after_m}");
+    // The same points with the radius that suits them.
+    let suited = run(&points, &ConsolidationParams::default());
+    assert!(suited.skipped.is_none() && suited.effect.distance_after_m <= before_m);
     // The paper's mode takes it, and says what it did.
     let paper = run(&points, &ConsolidationParams::paper());
     assert_eq!(paper.skipped, None);

@@ -1,5 +1,6 @@
 //! `experiment`: the papers' experiments, on generated data or on a run with known stems.
 
+mod consolidation;
 mod detection;
 mod figures;
 mod real;
@@ -35,6 +36,8 @@ enum What {
     Segmentation(segmentation::Args),
     /// The models behind the scores of treetops and trees
     Detection(detection::Args),
+    /// Models of trees with and without consolidation, in the manner of AdTree and by default
+    Consolidation(consolidation::Args),
 }
 
 /// Arguments of `experiment crowns`.
@@ -98,6 +101,7 @@ pub fn run(program: &Program, args: &Args) -> Result<u8> {
         What::Crowns(args) => crowns(program, args),
         What::Segmentation(args) => segmentation::run(args),
         What::Detection(args) => detection::run(args),
+        What::Consolidation(args) => consolidation::run(program, args),
     }
 }
 

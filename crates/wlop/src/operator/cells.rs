@@ -1,16 +1,16 @@
-//! Points sorted by the cells of a lattice, and walks along the sorted cells.
+//! Points sorted by the cells of a lattice, in blocks of neighbours ready to be summed over, and walks
+//! along the sorted cells.
 
 use super::kernel::{Block, LANES};
 use std::ops::Range;
 
-/// Cells on either side of a point's that its support can touch: a cell is half of the reach.
-const RINGS: i64 = 2;
-/// Edge of a cell over the reach.
-pub(super) const CELL_SHARE: f64 = 0.5;
-/// Rows of cells around a cell.
-const ROWS: usize = (2 * RINGS as usize + 1) * (2 * RINGS as usize + 1);
+/// Rows of cells around a cell: a cell is as wide as the reach, so that the next ones suffice.
+const ROWS: usize = 9;
+/// A cell is cut into 2 to the power of this many slices along each axis, by which its points are sorted:
+/// blocks are compact, and those out of reach are passed over whole.
+const SLICE_BITS: u32 = 3;
 
-/// Points in the sequence of their cells, ready to be summed over.
+/// Points in the sequence of their cells. Every cell begins a block of its own.
 #[derive(Debug, Default)]
 pub(super) struct Cells {
     cell_m: f64,
@@ -18,53 +18,113 @@ pub(super) struct Cells {
     keys: Vec<u128>,
     /// `starts[i]..starts[i + 1]` are the places of cell `i`.
     starts: Vec<u32>,
+    /// `block_starts[i]..block_starts[i + 1]` are the blocks of cell `i`.
+    block_starts: Vec<u32>,
     /// The index of the point at each place.
     pub(super) order: Vec<u32>,
-    at: Vec<[f64; 3]>,
-    narrowness: Vec<f32>,
-    weight: Vec<f32>,
+    /// Relative to the middle of their cell; what is left of a cell's last block has no weight.
+    blocks: Vec<Block>,
+    bounds: Vec<Bounds>,
+}
+
+/// The box of some points, m.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bounds {
+    low: [f32; 3],
+    high: [f32; 3],
+}
+
+impl Bounds {
+    pub(super) const EMPTY: Self = Self { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3] };
+
+    pub(super) fn include(&mut self, at: [f32; 3]) {
+        for axis in 0..3 {
+            self.low[axis] = self.low[axis].min(at[axis]);
+            self.high[axis] = self.high[axis].max(at[axis]);
+        }
+    }
 }
 
 /// The three indices of a cell as one number in their lexicographic order.
 fn key(cell: [i64; 3]) -> u128 {
     // Far points share the outermost cells; distances decide, cells only propose.
-    let part = |index: i64| (index.clamp(-(1 << 40), 1 << 40) + (1 << 41)) as u128;
-    (part(cell[0]) << 84) | (part(cell[1]) << 42) | part(cell[2])
+    let part = |index: i64| (index.clamp(-(1 << 37), 1 << 37) + (1 << 38)) as u128;
+    (part(cell[0]) << 78) | (part(cell[1]) << 39) | part(cell[2])
 }
 
 fn cell_of(key: u128) -> [i64; 3] {
-    let part = |shift: u32| ((key >> shift) & ((1 << 42) - 1)) as i64 - (1 << 41);
-    [part(84), part(42), part(0)]
+    let part = |shift: u32| ((key >> shift) & ((1 << 39) - 1)) as i64 - (1 << 38);
+    [part(78), part(39), part(0)]
+}
+
+/// The cell of a point, and within it the slice along each axis, interleaved (Morton 1966).
+fn place_key(point: [f64; 3], cell_m: f64) -> u128 {
+    let slices = f64::from(1u32 << SLICE_BITS);
+    let (mut cell, mut slice) = ([0; 3], [0; 3]);
+    for axis in 0..3 {
+        let along = point[axis] / cell_m;
+        let first = along.floor();
+        cell[axis] = first as i64;
+        slice[axis] = ((along - first) * slices) as u128;
+    }
+    let mut within = 0;
+    for bit in (0..SLICE_BITS).rev() {
+        for part in slice {
+            within = (within << 1) | ((part >> bit) & 1);
+        }
+    }
+    (key(cell) << (3 * SLICE_BITS)) | within
 }
 
 impl Cells {
-    /// Sorts points into cells; of points in one cell the sequence is that of their indices.
+    /// Sorts points into cells; of points in one slice of a cell the sequence is that of their indices.
     pub(super) fn new(points: &[[f64; 3]], narrowness: &[f32], cell_m: f64) -> Self {
-        let mut keyed: Vec<(u128, u32)> = points
-            .iter()
-            .zip(0..)
-            .map(|(p, i)| (key(p.map(|value| (value / cell_m).floor() as i64)), i))
-            .collect();
-        keyed.sort();
-        let (mut keys, mut starts) = (Vec::new(), Vec::new());
-        for (place, (key, _)) in keyed.iter().enumerate() {
-            if keys.last() != Some(key) {
-                keys.push(*key);
-                starts.push(place as u32);
-            }
+        let mut keyed: Vec<(u128, u32)> =
+            points.iter().zip(0..).map(|(p, i)| (place_key(*p, cell_m), i)).collect();
+        keyed.sort_unstable();
+        let mut cells = Self { cell_m, ..Self::default() };
+        cells.order = keyed.iter().map(|(_, index)| *index).collect();
+        let mut start = 0;
+        for cell in keyed.chunk_by(|a, b| a.0 >> (3 * SLICE_BITS) == b.0 >> (3 * SLICE_BITS)) {
+            cells.starts.push(start);
+            cells.push(cell, points, narrowness);
+            start += cell.len() as u32;
         }
-        starts.push(points.len() as u32);
-        let order: Vec<u32> = keyed.into_iter().map(|(_, index)| index).collect();
-        let at = order.iter().map(|&i| points[i as usize]).collect();
-        let narrowness = order.iter().map(|&i| narrowness[i as usize]).collect();
-        let weight = vec![1.0; order.len()];
-        Self { cell_m, keys, starts, order, at, narrowness, weight }
+        cells.starts.push(points.len() as u32);
+        cells.block_starts.push(cells.blocks.len() as u32);
+        cells
+    }
+
+    /// Adds the blocks of the next cell.
+    fn push(&mut self, members: &[(u128, u32)], points: &[[f64; 3]], narrowness: &[f32]) {
+        self.keys.push(members[0].0 >> (3 * SLICE_BITS));
+        self.block_starts.push(self.blocks.len() as u32);
+        let middle = self.middle(self.keys.len() - 1);
+        for eight in members.chunks(LANES) {
+            let (mut block, mut bounds) = (Block::EMPTY, Bounds::EMPTY);
+            for (lane, (_, index)) in eight.iter().enumerate() {
+                let at = relative(points[*index as usize], middle);
+                (block.x[lane], block.y[lane], block.z[lane]) = (at[0], at[1], at[2]);
+                block.narrowness[lane] = narrowness[*index as usize];
+                block.weight[lane] = 1.0;
+                bounds.include(at);
+            }
+            self.blocks.push(block);
+            self.bounds.push(bounds);
+        }
     }
 
     /// Gives every point a weight, by its index.
     pub(super) fn weigh(&mut self, weights: &[f32]) {
-        self.weight.clear();
-        self.weight.extend(self.order.iter().map(|&i| weights[i as usize]));
+        for cell in 0..self.len() {
+            let own = self.starts[cell] as usize..self.starts[cell + 1] as usize;
+            let blocks = self.block_starts[cell] as usize..self.block_starts[cell + 1] as usize;
+            for (block, places) in self.blocks[blocks].iter_mut().zip(self.order[own].chunks(LANES))
+            {
+                let lanes = block.weight.iter_mut().zip(places);
+                lanes.for_each(|(weight, index)| *weight = weights[*index as usize]);
+            }
+        }
     }
 
     /// Number of occupied cells.
@@ -94,27 +154,31 @@ impl Cells {
     }
 }
 
+/// Offset of a point from the middle of a cell, m.
+pub(super) fn relative(point: [f64; 3], middle: [f64; 3]) -> [f32; 3] {
+    [(point[0] - middle[0]) as f32, (point[1] - middle[1]) as f32, (point[2] - middle[2]) as f32]
+}
+
 /// A box around targets and how far their neighbours may be from it, relative to a cell's middle.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Around {
-    pub(super) low: [f32; 3],
-    pub(super) high: [f32; 3],
+    pub(super) targets: Bounds,
     pub(super) reach_m: f32,
 }
 
 impl Around {
-    /// Written out: this is asked once for every candidate.
-    #[inline]
-    fn holds(&self, x: f32, y: f32, z: f32) -> bool {
-        let outside = |low: f32, at: f32, high: f32| {
-            let (below, above) = (low - at, at - high);
+    /// Whether a box of neighbours, moved by `shift`, comes near enough.
+    #[inline(always)]
+    fn touches(&self, bounds: &Bounds, shift: [f32; 3]) -> bool {
+        let mut squared = 0.0;
+        for axis in 0..3 {
+            let below = self.targets.low[axis] - (bounds.high[axis] + shift[axis]);
+            let above = (bounds.low[axis] + shift[axis]) - self.targets.high[axis];
             let most = if below > above { below } else { above };
-            if most > 0.0 { most } else { 0.0 }
-        };
-        let dx = outside(self.low[0], x, self.high[0]);
-        let dy = outside(self.low[1], y, self.high[1]);
-        let dz = outside(self.low[2], z, self.high[2]);
-        dx * dx + dy * dy + dz * dz <= self.reach_m * self.reach_m
+            let gap = if most > 0.0 { most } else { 0.0 };
+            squared += gap * gap;
+        }
+        squared <= self.reach_m * self.reach_m
     }
 }
 
@@ -124,79 +188,51 @@ pub(super) struct Walk<'a> {
     source: &'a Cells,
     /// Where the row's search begins, by row.
     cursors: [usize; ROWS],
+    /// The blocks of the cells around, and where these lie from the cell in the middle, m.
+    around: Vec<(Range<u32>, [f32; 3])>,
     blocks: Vec<Block>,
-    len: usize,
 }
 
 impl<'a> Walk<'a> {
     /// Begins before the first cell.
     pub(super) fn new(source: &'a Cells) -> Self {
-        Self { source, cursors: [0; ROWS], blocks: Vec::new(), len: 0 }
+        Self { source, cursors: [0; ROWS], around: Vec::new(), blocks: Vec::new() }
     }
 
-    /// The points of the source near the cell `index` of `targets`, whose lattice is the same.
-    pub(super) fn gather(&mut self, targets: &Cells, index: usize, around: &Around) -> &[Block] {
-        let cell = cell_of(targets.keys[index]);
-        let middle = targets.middle(index);
-        self.len = 0;
-        let mut row = 0;
-        for dx in -RINGS..=RINGS {
-            for dy in -RINGS..=RINGS {
-                let [x, y] = [cell[0] + dx, cell[1] + dy];
-                let first = self.source.seek(self.cursors[row], key([x, y, cell[2] - RINGS]));
-                let last = key([x, y, cell[2] + RINGS]);
-                self.cursors[row] = first;
-                row += 1;
-                let source = self.source;
-                let cells = source.keys[first..].iter().take_while(|key| **key <= last).count();
-                self.take(
-                    source.starts[first] as usize..source.starts[first + cells] as usize,
-                    middle,
-                    around,
-                );
-            }
-        }
-        self.finish()
-    }
-
-    /// Adds those of a run of places that are near enough.
-    fn take(&mut self, places: Range<usize>, middle: [f64; 3], around: &Around) {
-        let blocks = (self.len + places.len()) / LANES + 1;
-        if self.blocks.len() < blocks {
-            self.blocks.resize(blocks, Block::EMPTY);
-        }
-        let source = self.source;
-        for place in places {
-            let [px, py, pz] = source.at[place];
-            let x = (px - middle[0]) as f32;
-            let y = (py - middle[1]) as f32;
-            let z = (pz - middle[2]) as f32;
-            if around.holds(x, y, z) {
-                let (block, lane) = (&mut self.blocks[self.len / LANES], self.len % LANES);
-                block.x[lane] = x;
-                block.y[lane] = y;
-                block.z[lane] = z;
-                block.narrowness[lane] = source.narrowness[place];
-                block.weight[lane] = source.weight[place];
-                self.len += 1;
+    /// Goes to the cell `index` of `targets`, whose lattice is the same.
+    pub(super) fn enter(&mut self, targets: &Cells, index: usize) {
+        let (source, cell) = (self.source, cell_of(targets.keys[index]));
+        self.around.clear();
+        for (row, cursor) in self.cursors.iter_mut().enumerate() {
+            let [x, y] = [cell[0] + row as i64 / 3 - 1, cell[1] + row as i64 % 3 - 1];
+            let first = source.seek(*cursor, key([x, y, cell[2] - 1]));
+            let last = key([x, y, cell[2] + 1]);
+            *cursor = first;
+            for near in first..source.len() {
+                if source.keys[near] > last {
+                    break;
+                }
+                let there = cell_of(source.keys[near]);
+                let shift = [0, 1, 2]
+                    .map(|axis| ((there[axis] - cell[axis]) as f64 * source.cell_m) as f32);
+                self.around.push((source.block_starts[near]..source.block_starts[near + 1], shift));
             }
         }
     }
 
-    /// Fills the last block with neighbours of no weight.
-    fn finish(&mut self) -> &[Block] {
-        let used = self.len.div_ceil(LANES);
-        if self.blocks.len() < used {
-            self.blocks.resize(used, Block::EMPTY);
-        }
-        if !self.len.is_multiple_of(LANES) {
-            let block = &mut self.blocks[used - 1];
-            for lane in self.len % LANES..LANES {
-                block.weight[lane] = 0.0;
-                block.narrowness[lane] = 0.0;
-                (block.x[lane], block.y[lane], block.z[lane]) = (0.0, 0.0, 0.0);
+    /// The blocks of the source that may hold neighbours, relative to the middle of the cell entered.
+    #[inline(always)]
+    pub(super) fn gather(&mut self, around: &Around) -> &[Block] {
+        self.blocks.clear();
+        for (range, shift) in &self.around {
+            let range = range.start as usize..range.end as usize;
+            let bounds = &self.source.bounds[range.clone()];
+            for (block, bounds) in self.source.blocks[range].iter().zip(bounds) {
+                if around.touches(bounds, *shift) {
+                    self.blocks.push(block.moved(*shift));
+                }
             }
         }
-        &self.blocks[..used]
+        &self.blocks
     }
 }

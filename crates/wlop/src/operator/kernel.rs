@@ -35,6 +35,18 @@ impl Block {
         narrowness: [0.0; LANES],
         weight: [0.0; LANES],
     };
+
+    /// The same neighbours seen from elsewhere, m.
+    #[inline(always)]
+    pub(super) fn moved(&self, shift: [f32; 3]) -> Self {
+        let mut moved = *self;
+        for lane in 0..LANES {
+            moved.x[lane] += shift[0];
+            moved.y[lane] += shift[1];
+            moved.z[lane] += shift[2];
+        }
+        moved
+    }
 }
 
 /// The point in whose surroundings is summed.
@@ -52,7 +64,7 @@ pub(super) struct Target {
 ///
 /// The coefficients are those of least largest relative error (1.1e-8) on 0 to 1/2, found by Lawson's
 /// iteration on 4001 Chebyshev points.
-#[inline]
+#[inline(always)]
 pub(super) fn exp_minus(t: f32) -> f32 {
     const C: [f32; 6] =
         [0.999_999_99, -0.999_998_57, 0.499_968_05, -0.166_400_38, 0.040_645_54, -0.006_475_53];
@@ -66,7 +78,7 @@ pub(super) fn exp_minus(t: f32) -> f32 {
 }
 
 /// theta of one neighbour, 0 beyond the cut; and the offset to it with its square.
-#[inline]
+#[inline(always)]
 fn theta(block: &Block, lane: usize, target: &Target) -> (f32, [f32; 3], f32) {
     let dx = block.x[lane] - target.at[0];
     let dy = block.y[lane] - target.at[1];
@@ -81,84 +93,124 @@ fn theta(block: &Block, lane: usize, target: &Target) -> (f32, [f32; 3], f32) {
     (exp_minus(t) * inside * block.weight[lane], [dx, dy, dz], squared)
 }
 
+#[inline(always)]
 fn add_up(lanes: [f32; LANES]) -> f32 {
     let [a, b, c, d, e, f, g, h] = lanes;
     ((a + e) + (c + g)) + ((b + f) + (d + h))
 }
 
+/// A sum over the neighbours of a target.
+///
+/// Everything below a sum is inlined by force and written in plain loops: what the compiler left as a
+/// function of its own would not be compiled for the processor that [`pulp`] finds.
+pub(super) trait Kernel {
+    /// What comes of it.
+    type Sum: Send + Copy + Default;
+    /// Sums up.
+    fn sum(blocks: &[Block], target: &Target) -> Self::Sum;
+}
+
 /// The sum of theta over the neighbours.
-pub(super) fn density(blocks: &[Block], target: &Target) -> f32 {
-    let mut sum = [0.0; LANES];
-    for block in blocks {
-        for lane in 0..LANES {
-            sum[lane] += theta(block, lane, target).0;
+pub(super) struct Density;
+
+impl Kernel for Density {
+    type Sum = f32;
+
+    #[inline(always)]
+    fn sum(blocks: &[Block], target: &Target) -> f32 {
+        let mut sum = [0.0; LANES];
+        for block in blocks {
+            for lane in 0..LANES {
+                sum[lane] += theta(block, lane, target).0;
+            }
         }
+        add_up(sum)
     }
-    add_up(sum)
 }
 
 /// The weighted mean of the offsets to the neighbours, m; nothing without neighbours. Weights are
 /// theta / r to the power of `POWER`: 0, 1 or 2. Of `OTHERS` what lies at the very place of the target,
 /// like itself, has no weight.
-pub(super) fn mean_offset<const POWER: u32, const OTHERS: bool>(
-    blocks: &[Block],
-    target: &Target,
-) -> [f32; 3] {
-    let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
-    let mut sum = [0.0; LANES];
-    let softening = SOFTENING / target.narrowness;
-    for block in blocks {
-        for lane in 0..LANES {
-            let (theta, offset, squared) = theta(block, lane, target);
-            let weight = match POWER {
-                0 => theta,
-                1 => theta / (squared + softening).sqrt(),
-                _ => theta / (squared + softening),
-            };
-            let weight = if OTHERS && squared == 0.0 { 0.0 } else { weight };
-            sum[lane] += weight;
-            x[lane] += weight * offset[0];
-            y[lane] += weight * offset[1];
-            z[lane] += weight * offset[2];
+pub(super) struct MeanOffset<const POWER: u32, const OTHERS: bool>;
+
+impl<const POWER: u32, const OTHERS: bool> Kernel for MeanOffset<POWER, OTHERS> {
+    type Sum = [f32; 3];
+
+    #[inline(always)]
+    fn sum(blocks: &[Block], target: &Target) -> [f32; 3] {
+        let (mut x, mut y, mut z) = ([0.0; LANES], [0.0; LANES], [0.0; LANES]);
+        let mut sum = [0.0; LANES];
+        let softening = SOFTENING / target.narrowness;
+        for block in blocks {
+            for lane in 0..LANES {
+                let (theta, offset, squared) = theta(block, lane, target);
+                let weight = match POWER {
+                    0 => theta,
+                    1 => theta / (squared + softening).sqrt(),
+                    _ => theta / (squared + softening),
+                };
+                let weight = if OTHERS && squared == 0.0 { 0.0 } else { weight };
+                sum[lane] += weight;
+                x[lane] += weight * offset[0];
+                y[lane] += weight * offset[1];
+                z[lane] += weight * offset[2];
+            }
+        }
+        let sum = add_up(sum);
+        if sum > NO_NEIGHBOURS {
+            [add_up(x) / sum, add_up(y) / sum, add_up(z) / sum]
+        } else {
+            [0.0; 3]
         }
     }
-    let sum = add_up(sum);
-    if sum > NO_NEIGHBOURS { [x, y, z].map(|axis| add_up(axis) / sum) } else { [0.0; 3] }
 }
 
 /// Weighted scatter of the neighbours about their mean: xx, xy, xz, yy, yz, zz in m², with theta as
 /// weights; nothing without neighbours.
-pub(super) fn scatter(blocks: &[Block], target: &Target) -> [f32; 6] {
-    let (mut sum, mut first, mut second) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 6]);
-    for block in blocks {
-        for lane in 0..LANES {
-            let (weight, [x, y, z], _) = theta(block, lane, target);
-            let (wx, wy, wz) = (weight * x, weight * y, weight * z);
-            sum[lane] += weight;
-            first[0][lane] += wx;
-            first[1][lane] += wy;
-            first[2][lane] += wz;
-            second[0][lane] += wx * x;
-            second[1][lane] += wx * y;
-            second[2][lane] += wx * z;
-            second[3][lane] += wy * y;
-            second[4][lane] += wy * z;
-            second[5][lane] += wz * z;
+pub(super) struct Scatter;
+
+impl Kernel for Scatter {
+    type Sum = [f32; 6];
+
+    #[inline(always)]
+    fn sum(blocks: &[Block], target: &Target) -> [f32; 6] {
+        let (mut sum, mut first, mut second) = ([0.0; LANES], [[0.0; LANES]; 3], [[0.0; LANES]; 6]);
+        for block in blocks {
+            for lane in 0..LANES {
+                let (weight, [x, y, z], _) = theta(block, lane, target);
+                let (wx, wy, wz) = (weight * x, weight * y, weight * z);
+                sum[lane] += weight;
+                first[0][lane] += wx;
+                first[1][lane] += wy;
+                first[2][lane] += wz;
+                second[0][lane] += wx * x;
+                second[1][lane] += wx * y;
+                second[2][lane] += wx * z;
+                second[3][lane] += wy * y;
+                second[4][lane] += wy * z;
+                second[5][lane] += wz * z;
+            }
         }
+        let sum = add_up(sum);
+        if sum <= NO_NEIGHBOURS {
+            return [0.0; 6];
+        }
+        let [x, y, z] = [add_up(first[0]) / sum, add_up(first[1]) / sum, add_up(first[2]) / sum];
+        [
+            add_up(second[0]) / sum - x * x,
+            add_up(second[1]) / sum - x * y,
+            add_up(second[2]) / sum - x * z,
+            add_up(second[3]) / sum - y * y,
+            add_up(second[4]) / sum - y * z,
+            add_up(second[5]) / sum - z * z,
+        ]
     }
-    let sum = add_up(sum);
-    if sum <= NO_NEIGHBOURS {
-        return [0.0; 6];
-    }
-    let mean = first.map(|lanes| add_up(lanes) / sum);
-    let [xx, xy, xz, yy, yz, zz] = second.map(|lanes| add_up(lanes) / sum);
-    let [x, y, z] = mean;
-    [xx - x * x, xy - x * y, xz - x * z, yy - y * y, yz - y * z, zz - z * z]
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::marker::PhantomData;
 
     #[test]
     fn the_polynomial_follows_the_exponential() {
@@ -170,5 +222,58 @@ mod tests {
             })
             .fold(0.0, f64::max);
         assert!(worst < 6e-6, "{worst}");
+    }
+
+    /// Neighbours within and beyond the reach, one at the very place of the target, and a lane without.
+    fn some_blocks() -> Vec<Block> {
+        let value = |seed: u32| (seed.wrapping_mul(2_654_435_761) >> 8) as f32 / (1 << 24) as f32;
+        let mut blocks = vec![Block::EMPTY; 40];
+        for (block, seed) in blocks.iter_mut().zip((0..).step_by(64)) {
+            for (lane, seed) in (0..LANES).zip((seed..).step_by(5)) {
+                block.x[lane] = 0.1 * value(seed) - 0.05;
+                block.y[lane] = 0.1 * value(seed + 1) - 0.05;
+                block.z[lane] = 0.1 * value(seed + 2) - 0.05;
+                block.narrowness[lane] = 4e3 + 8e3 * value(seed + 3);
+                block.weight[lane] = value(seed + 4);
+            }
+        }
+        (blocks[3].x[2], blocks[3].y[2], blocks[3].z[2]) = (0.01, -0.02, 0.03);
+        blocks[39].weight[7] = 0.0;
+        blocks
+    }
+
+    struct Wide<'a, K> {
+        blocks: &'a [Block],
+        target: &'a Target,
+        kernel: PhantomData<K>,
+    }
+
+    impl<K: Kernel> pulp::WithSimd for Wide<'_, K> {
+        type Output = K::Sum;
+
+        #[inline(always)]
+        fn with_simd<S: pulp::Simd>(self, _simd: S) -> K::Sum {
+            K::sum(self.blocks, self.target)
+        }
+    }
+
+    fn bits<K: Kernel>(blocks: &[Block], target: &Target, print: impl Fn(K::Sum) -> Vec<u32>) {
+        let plain = print(K::sum(blocks, target));
+        let kernel = PhantomData::<K>;
+        let wide = print(pulp::Arch::new().dispatch(Wide { blocks, target, kernel }));
+        assert_eq!(plain, wide);
+        assert!(plain.iter().all(|bits| *bits != 0));
+    }
+
+    #[test]
+    fn wide_registers_change_no_bit() {
+        let blocks = some_blocks();
+        let target = Target { at: [0.01, -0.02, 0.03], narrowness: 6e3, cut: 4.0 };
+        let all = |values: &[f32]| values.iter().map(|value| value.to_bits()).collect::<Vec<u32>>();
+        bits::<Density>(&blocks, &target, |sum| all(&[sum]));
+        bits::<MeanOffset<0, false>>(&blocks, &target, |sum| all(&sum));
+        bits::<MeanOffset<1, true>>(&blocks, &target, |sum| all(&sum));
+        bits::<MeanOffset<2, true>>(&blocks, &target, |sum| all(&sum));
+        bits::<Scatter>(&blocks, &target, |sum| all(&sum));
     }
 }

@@ -1,13 +1,17 @@
 //! The iteration, and the passes over all pairs of neighbours that it is made of.
 
-use super::cells::{Around, CELL_SHARE, Cells, Walk};
-use super::kernel::{Block, Target, density, mean_offset, scatter};
+use super::cells::{Around, Bounds, Cells, Walk, relative};
+use super::kernel::{Density, Kernel, MeanOffset, Scatter, Target};
 use super::{Outcome, Settings, Weights};
+use pulp::{Arch, Simd, WithSimd};
 use rayon::prelude::*;
+use std::marker::PhantomData;
 use std::ops::Range;
 
 /// Cells that one thread works on at a time.
 const CELLS_AT_A_TIME: usize = 64;
+/// Targets, next to each other in a cell, that share the blocks around them.
+const TARGETS_AT_A_TIME: usize = 8;
 
 /// Positions with their radii and what follows from them.
 #[derive(Debug, Clone)]
@@ -30,7 +34,7 @@ impl Cloud {
 
     /// The points on the lattice for a class.
     fn cells(&self, class: i32, settings: &Settings) -> Cells {
-        let cell_m = libm::ldexp(1.0, class) * settings.reach_ratio * CELL_SHARE;
+        let cell_m = libm::ldexp(1.0, class) * settings.reach_ratio;
         Cells::new(&self.at, &self.narrowness, cell_m)
     }
 
@@ -44,27 +48,30 @@ impl Cloud {
 
     /// 1 + the sum of theta over the other points, for every point: v of points, w of samples.
     fn densities(&self, settings: &Settings) -> Vec<f32> {
-        // A point is among its neighbours, with a theta of 1: the formula's 1.
-        self.each(settings, |blocks, target| density(blocks, target).max(1.0))
+        let mut all = vec![1.0; self.at.len()];
+        for class in self.classes() {
+            self.add_densities(&mut all, &self.cells(class, settings), class, settings);
+        }
+        all
     }
 
-    /// The weighted scatter of the points around every point, see [`scatter`].
+    /// The densities of the points of one class. `cells` are those of the class.
+    fn add_densities(&self, all: &mut [f32], cells: &Cells, class: i32, settings: &Settings) {
+        let pass = Pass { cloud: self, targets: cells, class, settings };
+        for (index, sum) in pass.over::<Density>(cells) {
+            // A point is among its neighbours, with a theta of 1: the formula's 1.
+            all[index as usize] = sum.max(1.0);
+        }
+    }
+
+    /// The weighted scatter of the points around every point, see [`Scatter`].
     pub(super) fn scatters(&self, settings: &Settings) -> Vec<[f32; 6]> {
-        self.each(settings, scatter)
-    }
-
-    /// A sum over the neighbours of every point.
-    fn each<T: Send + Copy + Default>(
-        &self,
-        settings: &Settings,
-        sum: impl Fn(&[Block], &Target) -> T + Sync,
-    ) -> Vec<T> {
-        let mut all = vec![T::default(); self.at.len()];
+        let mut all = vec![[0.0; 6]; self.at.len()];
         for class in self.classes() {
             let cells = self.cells(class, settings);
             let pass = Pass { cloud: self, targets: &cells, class, settings };
-            for (index, value) in pass.over(&cells, &sum) {
-                all[index as usize] = value;
+            for (index, scatter) in pass.over::<Scatter>(&cells) {
+                all[index as usize] = scatter;
             }
         }
         all
@@ -109,37 +116,45 @@ impl<'a> Projection<'a> {
 
     /// How far each sample moves in one iteration, m.
     fn moves(&self, samples: &Cloud, first: bool) -> Vec<[f64; 3]> {
-        let mut moves = vec![[0.0; 3]; samples.at.len()];
         let guess = first && self.settings.weights == Weights::Paper;
-        let weights = if guess { Vec::new() } else { samples.densities(self.settings) };
-        for (class, points) in &self.classes {
-            let mut cells = samples.cells(*class, self.settings);
-            let class = *class;
-            if guess {
-                let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
-                for (index, pull) in pass.over(points, mean_offset::<0, false>) {
-                    moves[index as usize] = pull.map(f64::from);
-                }
-                continue;
+        let lattice = |(class, _): &(i32, Cells)| samples.cells(*class, self.settings);
+        let mut lattices: Vec<Cells> = self.classes.iter().map(lattice).collect();
+        if !guess {
+            let mut densities = vec![1.0; samples.at.len()];
+            for ((class, _), cells) in self.classes.iter().zip(&lattices) {
+                samples.add_densities(&mut densities, cells, *class, self.settings);
             }
-            cells.weigh(&weights);
-            let pass = Pass { cloud: samples, targets: &cells, class, settings: self.settings };
-            let (pulls, to_others) = match self.settings.weights {
-                Weights::Paper => (
-                    pass.over(points, mean_offset::<1, false>),
-                    pass.over(&cells, mean_offset::<1, true>),
-                ),
-                Weights::Even => (
-                    pass.over(points, mean_offset::<0, false>),
-                    pass.over(&cells, mean_offset::<2, true>),
-                ),
-            };
-            for ((index, pull), (_, to)) in pulls.into_iter().zip(to_others) {
-                moves[index as usize] =
-                    [0, 1, 2].map(|k| f64::from(pull[k]) - self.settings.mu * f64::from(to[k]));
-            }
+            lattices.iter_mut().for_each(|cells| cells.weigh(&densities));
+        }
+        let mut moves = vec![[0.0; 3]; samples.at.len()];
+        for ((class, points), cells) in self.classes.iter().zip(&lattices) {
+            let (class, settings) = (*class, self.settings);
+            let pass = Pass { cloud: samples, targets: cells, class, settings };
+            self.add_moves(&mut moves, &pass, points, guess);
         }
         moves
+    }
+
+    /// The moves of the samples of one class; `guess` is the first one of the papers.
+    fn add_moves(&self, moves: &mut [[f64; 3]], pass: &Pass<'_>, points: &Cells, guess: bool) {
+        let pulls = match self.settings.weights {
+            Weights::Paper if !guess => pass.over::<MeanOffset<1, false>>(points),
+            _ => pass.over::<MeanOffset<0, false>>(points),
+        };
+        for (index, pull) in pulls {
+            moves[index as usize] = pull.map(f64::from);
+        }
+        if guess {
+            return;
+        }
+        let to_others = match self.settings.weights {
+            Weights::Paper => pass.over::<MeanOffset<1, true>>(pass.targets),
+            Weights::Even => pass.over::<MeanOffset<2, true>>(pass.targets),
+        };
+        for (index, to) in to_others {
+            let moved = &mut moves[index as usize];
+            (0..3).for_each(|k| moved[k] -= self.settings.mu * f64::from(to[k]));
+        }
     }
 }
 
@@ -155,33 +170,32 @@ struct Pass<'a> {
 impl Pass<'_> {
     /// One result for each target, with the target's index, in a fixed sequence. `source` lies on
     /// the same lattice.
-    fn over<T: Send>(
-        &self,
-        source: &Cells,
-        sum: impl Fn(&[Block], &Target) -> T + Sync,
-    ) -> Vec<(u32, T)> {
+    fn over<K: Kernel>(&self, source: &Cells) -> Vec<(u32, K::Sum)> {
         let chunks = self.targets.len().div_ceil(CELLS_AT_A_TIME);
         let of_chunk = |chunk: usize| {
             let first = chunk * CELLS_AT_A_TIME;
             let last = (first + CELLS_AT_A_TIME).min(self.targets.len());
-            self.over_cells(first..last, source, &sum)
+            let kernel = PhantomData::<K>;
+            Arch::new().dispatch(Share { pass: self, cells: first..last, source, kernel })
         };
-        let parts: Vec<Vec<(u32, T)>> = (0..chunks).into_par_iter().map(of_chunk).collect();
+        let parts: Vec<Vec<(u32, K::Sum)>> = (0..chunks).into_par_iter().map(of_chunk).collect();
         parts.into_iter().flatten().collect()
     }
 
-    fn over_cells<T>(
-        &self,
-        cells: Range<usize>,
-        source: &Cells,
-        sum: &impl Fn(&[Block], &Target) -> T,
-    ) -> Vec<(u32, T)> {
+    #[inline(always)]
+    fn over_cells<K: Kernel>(&self, cells: Range<usize>, source: &Cells) -> Vec<(u32, K::Sum)> {
         let (mut walk, mut results, mut here) = (Walk::new(source), Vec::new(), Vec::new());
         for cell in cells {
             self.targets_in(cell, &mut here);
-            if !here.is_empty() {
-                let blocks = walk.gather(self.targets, cell, &around(&here));
-                results.extend(here.iter().map(|(index, target)| (*index, sum(blocks, target))));
+            if here.is_empty() {
+                continue;
+            }
+            walk.enter(self.targets, cell);
+            for group in here.chunks(TARGETS_AT_A_TIME) {
+                let blocks = walk.gather(&around(group));
+                for (index, target) in group {
+                    results.push((*index, K::sum(blocks, target)));
+                }
             }
         }
         results
@@ -195,7 +209,7 @@ impl Pass<'_> {
         for place in self.targets.places(cell) {
             let index = self.targets.order[place] as usize;
             if self.cloud.class[index] == self.class {
-                let at = [0, 1, 2].map(|axis| (self.cloud.at[index][axis] - middle[axis]) as f32);
+                let at = relative(self.cloud.at[index], middle);
                 let target = Target { at, narrowness: self.cloud.narrowness[index], cut };
                 here.push((index as u32, target));
             }
@@ -203,16 +217,32 @@ impl Pass<'_> {
     }
 }
 
+/// The share of a thread in a pass. Not a closure: that would stay a function of its own, which is not
+/// compiled for the processor that is found.
+struct Share<'a, K> {
+    pass: &'a Pass<'a>,
+    cells: Range<usize>,
+    source: &'a Cells,
+    kernel: PhantomData<K>,
+}
+
+impl<K: Kernel> WithSimd for Share<'_, K> {
+    type Output = Vec<(u32, K::Sum)>;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, _simd: S) -> Self::Output {
+        self.pass.over_cells::<K>(self.cells, self.source)
+    }
+}
+
 /// The box of some targets and the reach of the widest.
+#[inline(always)]
 fn around(targets: &[(u32, Target)]) -> Around {
     /// So that rounding leaves out none that counts.
     const A_LITTLE_MORE: f32 = 1.0001;
-    let mut around = Around { low: [f32::INFINITY; 3], high: [f32::NEG_INFINITY; 3], reach_m: 0.0 };
+    let mut around = Around { targets: Bounds::EMPTY, reach_m: 0.0 };
     for (_, target) in targets {
-        for axis in 0..3 {
-            around.low[axis] = around.low[axis].min(target.at[axis]);
-            around.high[axis] = around.high[axis].max(target.at[axis]);
-        }
+        around.targets.include(target.at);
         let reach_m = (target.cut / target.narrowness).sqrt() * A_LITTLE_MORE;
         around.reach_m = around.reach_m.max(reach_m);
     }
