@@ -41,9 +41,9 @@ pub enum Edges {
 pub struct SkeletonParams {
     /// How the skeleton is made.
     pub method: Method,
-    /// How small a branch may be where `method` is `levels`: 1 is the default; half of it keeps
-    /// only branches that explain twice as much, twice of it those that explain half.
-    #[schemars(range(min = 0.01, max = 100.0))]
+    /// How small a branch may be where `method` is `levels`: half of the default keeps only branches
+    /// that explain twice as much, twice of it those that explain half.
+    #[schemars(range(min = 0.01, max = 100.0), extend("x-source" = "1: fewest branches that reach the distances of AdTree on public scans, docs/terrestrial.md"))]
     pub detail: f64,
     /// Neighbours of a point in the graph where `method` is `levels`.
     #[schemars(range(min = 4, max = 64), extend("x-unit" = "points"))]

@@ -27,7 +27,7 @@ impl Stage for SkeletonStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "skeleton",
-            version: 1,
+            version: 2,
             summary: "the branching axes of a tree by level sets of the distance from its base, or as AdTree makes them (Du et al. 2019)",
             unit: UnitKind::Tree,
             inputs: INPUTS,

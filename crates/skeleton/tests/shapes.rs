@@ -57,7 +57,7 @@ fn a_fork_has_two_arms_and_no_more() {
 fn a_spruce_has_its_branches_where_they_are() {
     let tubes = spruce();
     let points = scan(&tubes, 6000.0, 0.002, 4);
-    let found = of(&points, &SkeletonParams { detail: 0.25, ..Default::default() });
+    let found = of(&points, &SkeletonParams { detail: 0.05, ..Default::default() });
     let (off, lost) = (off_axis(&found, &tubes), missed(&tubes, &found));
     // 49 axes: a stem, 24 branches, 24 twigs. Some sides of thin branches are branches of their own.
     assert!((49..=68).contains(&found.branches()), "{}", found.branches());
@@ -109,6 +109,35 @@ fn leaves_do_not_move_the_axes() {
     let lost = missed(&tubes, &found);
     assert!(mean(&lost) < 0.025, "{}", mean(&lost));
     assert!(share_above(&lost, 0.08) < 0.05, "{}", share_above(&lost, 0.08));
+}
+
+#[test]
+fn paths_keep_to_a_sparse_leader_beside_dense_twigs() {
+    // A leader of few points, whose neighbourhoods therefore do not look like wood, and beside it twigs of
+    // many that come back to it: shortest paths to which leaves were dear went over the twigs, and the
+    // leader was a twig of them (an oak of the sample plot).
+    let stem = Tube::new(vec![[0.0; 3], [0.0, 0.0, 2.0]], [0.09, 0.07]);
+    let leader = Tube::new(vec![[0.0, 0.0, 2.0], [0.0, 0.0, 5.0]], [0.07, 0.04]);
+    let twig = |side: f64| {
+        let away = 0.5 * side;
+        let axis = vec![
+            [0.07 * side, 0.0, 1.9],
+            [away, 0.0, 2.2],
+            [away, 0.0, 4.0],
+            [0.07 * side, 0.0, 4.2],
+        ];
+        Tube::new(axis, [0.008, 0.004])
+    };
+    let dense = scan(&[stem, twig(1.0), twig(-1.0)], 8000.0, 0.002, 8);
+    let sparse = scan(&[leader], 500.0, 0.002, 9);
+    let likely: Vec<f32> = dense.iter().map(|_| 1.0).chain(sparse.iter().map(|_| 0.1)).collect();
+    let points: Vec<[f64; 3]> = dense.into_iter().chain(sparse).collect();
+    let found =
+        skeleton(&points, Some(&likely), None, &SkeletonParams::default()).unwrap().skeleton;
+    let run = &found.runs()[0];
+    let at = |node: &u32| found.nodes[*node as usize].position_m;
+    let sideways = run.iter().map(at).map(|[x, y, _]| libm::hypot(x, y)).fold(0.0, f64::max);
+    assert!(at(&run[run.len() - 1])[2] > 4.8 && sideways < 0.07, "{sideways}");
 }
 
 #[test]

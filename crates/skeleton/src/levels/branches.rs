@@ -7,11 +7,16 @@ use crate::paths::NONE;
 use crate::vector::{Vector, distance, dot, sub, to_segment};
 
 /// What a branch must explain at `detail` 1: the distances of its points from the surface of the
-/// branch it leaves, in spacings, added up. Measured: see `tests/real.rs`.
-const EXPLAINED_SPACINGS: f64 = 5.0;
+/// branch it leaves, in units of [`UNIT_M`] or of the spacing where that is wider, added up. Measured:
+/// docs/terrestrial.md.
+const EXPLAINED: f64 = 1.12;
 
-/// Fewest points of a branch at `detail` 1.
-const FEWEST_POINTS: f64 = 3.0;
+/// Unit of what a branch explains, m. Spacings alone would give a dense cloud a branch for every bud,
+/// metres alone would leave a sparse one a branch for every point.
+const UNIT_M: f64 = 0.1;
+
+/// Fewest points of a branch at `detail` 1: two from `detail` 0.5 downwards.
+const FEWEST_POINTS: f64 = 0.7;
 
 /// How far along the branch it leaves a side branch may be nearest to it: its own length times this.
 const ALONGSIDE: f64 = 1.5;
@@ -140,22 +145,21 @@ impl Pruning<'_> {
         own.copied().chain(branch.absorbed.iter().map(|entry| entry.1)).collect()
     }
 
-    /// Whether the distances of a branch's points from the surface of the one it leaves, in spacings,
-    /// add up to enough. Points on leaves count less. Tips come first: they tell most.
+    /// Whether the distances of a branch's points from the surface of the one it leaves add up to
+    /// enough. Tips come first: they tell most.
     fn is_worth(&self, branch: &Branch, parent: &Branch) -> bool {
         let points = self.points_of(branch);
         if (points.len() as f64) < FEWEST_POINTS / self.detail {
             return false;
         }
         let near = self.alongside(branch, parent);
-        let enough = EXPLAINED_SPACINGS / self.detail;
+        let enough = EXPLAINED / self.detail;
         let mut worth = 0.0;
         points.iter().rev().any(|&point| {
-            let spacing = self.spacing_m[point as usize].max(1e-6);
-            let wood = 0.25 + 0.75 * f64::from(self.cloud.wood[point as usize]);
+            let spacing = self.spacing_m[point as usize];
             let away = near.nearest(self.at(point)).0 - near.radius;
             let surface = near.radius.min(SURFACE_SPACINGS * spacing);
-            worth += wood * (away - surface).max(0.0) / spacing;
+            worth += (away - surface).max(0.0) / spacing.max(UNIT_M);
             worth >= enough
         })
     }

@@ -30,11 +30,13 @@ const SPACING_RANK: usize = 4;
 /// The first section is this share of the tree's height.
 const FIRST_SHARE: f64 = 0.02;
 
-/// Factors by which sections are at most longer and shorter for less and more detail.
+/// Factor on the lengths of sections that are told in spacings: that of `detail` 1 and more, with less
+/// detail in proportion to the root of its inverse, up to the largest.
 const FINENESS: (f64, f64) = (0.7, 2.0);
 
-/// How much costlier an edge to leaves is.
-const LEAF_COST: f64 = 3.0;
+/// How much costlier an edge to leaves is. More of it, and paths leave a leader with few points,
+/// which have no shape that tells wood, for the dense twigs beside it.
+const LEAF_COST: f64 = 0.3;
 
 /// The skeleton of a prepared cloud.
 pub(crate) fn skeleton(
@@ -94,7 +96,7 @@ fn build(
         length_m: &length_m,
         upwards: &upwards,
         first_radius_m: base::first_radius_m(&cloud.points, &sources),
-        fineness: (1.0 / params.detail.sqrt()).clamp(FINENESS.0, FINENESS.1),
+        fineness: (FINENESS.0 / params.detail.sqrt()).clamp(FINENESS.0, FINENESS.1),
         first_length_m: (FIRST_SHARE * (high - low)).max(2.0 * median(spacing_m)),
     };
     let grown = grow::grow(&ground, sources);
