@@ -16,6 +16,7 @@
 use crate::Error;
 use crate::params::TilesParams;
 use rayon::prelude::*;
+use timberline_pointcloud::frame::{TICK_M, ticks_from_world};
 use timberline_pointcloud::{Nearest3, PointCloud, Rect};
 
 /// Spacings below this are the noise of the ranges, which says nothing (METHODS.md: 1 to 5 mm).
@@ -50,7 +51,11 @@ impl Outliers {
     /// # Errors
     /// [`Error::Params`] when the tree over the points cannot be built.
     pub(crate) fn of(&self, cloud: &PointCloud, own: &Rect) -> Result<Vec<u32>, Error> {
-        let at: Vec<[f64; 3]> = (0..cloud.len()).map(|index| cloud.local(index)).collect();
+        // In whole ticks, so that equal distances are equal wherever in the world the points lie: which of
+        // them counts is then decided by the order of points.
+        let tick = |value: f64| ticks_from_world(value) as f64;
+        let at: Vec<[f64; 3]> =
+            (0..cloud.len()).map(|index| cloud.local(index).map(tick)).collect();
         let tree = Nearest3::new(&at).map_err(|error| Error::Params(error.to_string()))?;
         let near = own.grown(self.reach_m);
         let within = |rect: &Rect, index: usize| {
@@ -69,13 +74,13 @@ impl Outliers {
         Ok((0..at.len() as u32).into_par_iter().filter(is_outlier).collect())
     }
 
-    /// The nearest other points within reach: index and distance, metres.
+    /// The nearest other points within reach: index and distance, metres. `at` is in ticks.
     fn nearest(&self, tree: &Nearest3, at: &[[f64; 3]], index: usize) -> Vec<(usize, f64)> {
         let found = tree.nearest(&at[index], self.neighbours + 1);
         let mut others: Vec<(usize, f64)> = found
             .into_iter()
             .filter(|neighbour| neighbour.index != index)
-            .map(|neighbour| (neighbour.index, neighbour.squared_m2.sqrt()))
+            .map(|neighbour| (neighbour.index, neighbour.squared_m2.sqrt() * TICK_M))
             .filter(|(_, distance_m)| *distance_m <= self.reach_m)
             .collect();
         // Among many points of one place the point itself may not be found.

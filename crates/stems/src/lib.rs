@@ -16,6 +16,7 @@ pub mod graph;
 pub mod grounded;
 pub mod params;
 pub mod paths;
+pub mod shown_ground;
 pub mod slices;
 pub mod space;
 pub mod stage;
