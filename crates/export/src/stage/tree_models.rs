@@ -77,8 +77,8 @@ impl Stage for TreeModelsStage {
         }
     }
 
-    /// The points, and the corners of the closed mesh's grid: measured 20 for a triangle, of 32 bytes
-    /// while they are sorted.
+    /// The points, and the corners of the closed mesh's grid: an estimate, 20 corners for a triangle,
+    /// of 32 bytes while they are sorted.
     fn memory_bytes(params: &Params, points: u64) -> u64 {
         const BYTES_PER_POINT: u64 = 200;
         const BYTES_PER_TRIANGLE: u64 = 700;
