@@ -16,6 +16,7 @@
 use crate::Error;
 use crate::params::TilesParams;
 use rayon::prelude::*;
+use timberline_pointcloud::frame::{TICK_M, ticks_from_world};
 use timberline_pointcloud::{Nearest3, PointCloud, Rect};
 
 /// Spacings below this are the noise of the ranges, which says nothing (METHODS.md: 1 to 5 mm).
@@ -50,7 +51,11 @@ impl Outliers {
     /// # Errors
     /// [`Error::Params`] when the tree over the points cannot be built.
     pub(crate) fn of(&self, cloud: &PointCloud, own: &Rect) -> Result<Vec<u32>, Error> {
-        let at: Vec<[f64; 3]> = (0..cloud.len()).map(|index| cloud.local(index)).collect();
+        // In whole ticks, so that equal distances are equal wherever in the world the points lie: which of
+        // them counts is then decided by the order of points.
+        let tick = |value: f64| ticks_from_world(value) as f64;
+        let at: Vec<[f64; 3]> =
+            (0..cloud.len()).map(|index| cloud.local(index).map(tick)).collect();
         let tree = Nearest3::new(&at).map_err(|error| Error::Params(error.to_string()))?;
         let near = own.grown(self.reach_m);
         let around = |index: usize| {
@@ -70,11 +75,12 @@ impl Outliers {
         Around { mean_m: self.reach_m, others: Vec::new() }
     }
 
+    /// What a point has around it; `at` is in ticks.
     fn around(&self, tree: &Nearest3, at: &[[f64; 3]], index: usize) -> Around {
         let found = tree.nearest(&at[index], self.neighbours + 1).into_iter();
         let near = found
             .filter(|other| other.index != index)
-            .map(|other| (other.index as u32, other.squared_m2.sqrt()))
+            .map(|other| (other.index as u32, other.squared_m2.sqrt() * TICK_M))
             .filter(|(_, distance_m)| *distance_m <= self.reach_m);
         // Among many points of one place the point itself may not be found.
         let near: Vec<(u32, f64)> = near.take(self.neighbours).collect();

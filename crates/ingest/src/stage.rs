@@ -100,7 +100,7 @@ impl Stage for Tiles {
     fn info() -> StageInfo {
         StageInfo {
             name: "tiles",
-            version: 1,
+            version: 2,
             summary: "puts a tile together: drops noise, withheld, isolated and duplicate points, thins, marks outliers",
             unit: UnitKind::Tile,
             inputs: &INPUTS,

@@ -16,12 +16,12 @@ pub enum Error {
     },
     /// All points lie in a plane or on a line.
     #[error(
-        "all {points} points lie within {thickness_m:.3} m of a plane: this is no tree (a wall, a \
-         single slice?)"
+        "all {voxels} voxels with points lie within {thickness_m:.3} m of a plane: this is no tree \
+         (a wall, a single slice?)"
     )]
     Flat {
-        /// Number of points.
-        points: usize,
+        /// Number of voxels with points.
+        voxels: usize,
         /// Standard deviation across the plane, m.
         thickness_m: f64,
     },

@@ -17,6 +17,7 @@ pub mod grounded;
 mod joined;
 pub mod params;
 pub mod paths;
+pub mod shown_ground;
 pub mod slices;
 pub mod space;
 pub mod stage;

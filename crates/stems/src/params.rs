@@ -49,8 +49,8 @@ pub struct StemsParams {
     /// Exponent of the diameter by which ways are divided.
     #[schemars(range(min = 0.0, max = 2.0), extend("x-unit" = "1", "x-source" = "Tao et al. 2015, comparative shortest paths: 2/3"))]
     pub metabolic_exponent: f64,
-    /// A scan has ground if at least this share of its area does; otherwise a tree stands on its
-    /// lowest points.
+    /// A scan has ground if at least this share of its area does, as a surface below all else; otherwise
+    /// a tree stands on its lowest points.
     #[schemars(range(min = 0.0, max = 1.0), extend("x-unit" = "1", "x-source" = "single trees cut out of a scan have none; under dense crowns half is hidden"))]
     pub ground_share: f64,
 }

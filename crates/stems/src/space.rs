@@ -14,10 +14,6 @@ use timberline_pointcloud::Frame;
 
 /// Fewest voxels of a scan with a tree.
 const FEWEST_VOXELS: usize = 20;
-/// Edge of the cells that are looked at for ground, m.
-const GROUND_CELL_M: f64 = 0.5;
-/// Fewest cells with ground: wider than the foot of a tree.
-const FEWEST_GROUND_CELLS: usize = 8;
 /// Breast height above the base, m.
 const BREAST_HEIGHT_M: f64 = 1.3;
 /// Diameter that undergrowth counts with where its ways compete with those of stems, m.
@@ -55,29 +51,6 @@ pub struct Space {
     pub owner: Vec<u32>,
 }
 
-/// Whether a scan shows the ground: enough of its area has ground points. What is taken for ground
-/// under a single tree is its foot alone.
-#[must_use]
-pub fn shows_ground(voxels: &Voxels, least_share: f64) -> bool {
-    let (all, ground) = ground_cells(voxels);
-    ground >= FEWEST_GROUND_CELLS && ground as f64 >= least_share * all as f64
-}
-
-/// Number of cells with points, and of those with ground points.
-fn ground_cells(voxels: &Voxels) -> (usize, usize) {
-    let per_cell = (GROUND_CELL_M / voxels.edge_m()).round().max(1.0) as i32;
-    let cell = |index: [i32; 3]| [index[0].div_euclid(per_cell), index[1].div_euclid(per_cell)];
-    let mut cells: Vec<([i32; 2], bool)> =
-        voxels.all.iter().map(|voxel| (cell(voxel.index), voxel.is_ground)).collect();
-    cells.sort_unstable();
-    let (mut all, mut ground) = (0usize, 0usize);
-    for same in cells.chunk_by(|a, b| a.0 == b.0) {
-        all += 1;
-        ground += usize::from(same.iter().any(|(_, is_ground)| *is_ground));
-    }
-    (all, ground)
-}
-
 /// Elevation that heights count from in a scan without ground, m: its lowest points', of which two
 /// in a thousand are left out as noise.
 #[must_use]
@@ -101,10 +74,10 @@ pub fn trees(
     params: &StemsParams,
 ) -> Result<Space, Error> {
     let positions: Vec<[f64; 3]> =
-        voxels.all.iter().map(|voxel| frame.local_from_world(voxel.centroid_m())).collect();
+        voxels.all.iter().map(|voxel| voxel.local_centroid_m(frame)).collect();
     if positions.len() < FEWEST_VOXELS {
         return Err(Error::TooFewPoints {
-            what: "voxels",
+            what: "voxels with points",
             found: positions.len(),
             needed: FEWEST_VOXELS,
         });
@@ -141,7 +114,7 @@ fn check_depth(positions: &[[f64; 3]]) -> Result<(), Error> {
     spreads.sort_by(f64::total_cmp);
     let thickness_m = spreads[0];
     if thickness_m < THINNEST_M.max(FLATTEST * spreads[1]) && spreads[2] > 10.0 * THINNEST_M {
-        return Err(Error::Flat { points: positions.len(), thickness_m });
+        return Err(Error::Flat { voxels: positions.len(), thickness_m });
     }
     Ok(())
 }

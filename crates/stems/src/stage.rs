@@ -2,8 +2,9 @@
 
 mod tree_cloud;
 
+use crate::shown_ground::shows_ground;
 use crate::slices::{SlicePoint, slices_of};
-use crate::space::{Space, foot_m, shows_ground, trees};
+use crate::space::{Space, foot_m, trees};
 use crate::voxels::Sample;
 use crate::{Error, StemsParams, Voxels};
 use timberline_artefact::kinds::{
@@ -13,6 +14,7 @@ use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
 use timberline_artefact::{Facts, Kind, UnitKind, tree_id};
+use timberline_pointcloud::frame::quantise;
 use timberline_pointcloud::{Bounds3, Frame, TileId};
 
 pub use tree_cloud::TreeCloudStage;
@@ -39,7 +41,7 @@ impl Stage for StemsStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "stems",
-            version: 1,
+            version: 2,
             summary: "stems from circles on slices, and the space of each tree by comparative \
                       shortest paths (Tao et al. 2015)",
             unit: UnitKind::Campaign,
@@ -140,7 +142,7 @@ fn slice_points(
             let known = part.heights.height_m.get(index).copied().unwrap_or(f32::NAN);
             let height_m = foot_m.map_or(f64::from(known), |foot| world[2] - foot);
             if !slices_of(height_m, params).is_empty() {
-                let [x, y, z] = frame.local_from_world(world);
+                let [x, y, z] = frame.local_from_world(world).map(quantise);
                 points.push(SlicePoint { x, y, z, height_m });
             }
         }
@@ -163,7 +165,7 @@ fn stems(voxels: &Voxels, space: &Space) -> Result<Stems, Error> {
             if tree.on_ground { BaseSource::Ground } else { BaseSource::LowestPoints };
         Stem {
             tree_id: tree_id(tree.base_m[0], tree.base_m[1]),
-            base_m: tree.base_m,
+            base_m: tree.base_m.map(quantise),
             base_source,
             dbh_m: tree.dbh_m.unwrap_or(f64::NAN),
             bounds: bounds[place],

@@ -1,6 +1,7 @@
 //! A plot thinned to the voxels of a lattice that is fixed in the world.
 
 use crate::Error;
+use timberline_pointcloud::Frame;
 use timberline_pointcloud::frame::{TICKS_PER_M, ticks_from_world, world_from_ticks};
 
 /// A point to be put into a voxel.
@@ -39,6 +40,17 @@ impl Voxel {
     #[must_use]
     pub fn centroid_m(&self) -> [f64; 3] {
         self.sum.map(|sum| sum as f64 / (TICKS_PER_M * f64::from(self.points)))
+    }
+
+    /// Mean position of its points in a frame, m: of whole numbers, so the same bits wherever in the
+    /// world voxels and frame lie.
+    #[must_use]
+    pub fn local_centroid_m(&self, frame: &Frame) -> [f64; 3] {
+        let points = i64::from(self.points);
+        std::array::from_fn(|axis| {
+            let origin = frame.origin_m[axis] * (TICKS_PER_M as i64);
+            (self.sum[axis] - origin * points) as f64 / (TICKS_PER_M * f64::from(self.points))
+        })
     }
 
     fn absorb(&mut self, other: &Self) {

@@ -355,7 +355,11 @@ impl Pass<'_> {
             Found::Whole(known) => Ended::without_running(Outcome::Cached, known.clone(), None),
             _ if !selection.is_active(position, plan.unit()) => return None,
             _ => {
-                let error = format!("not there: {}", plan.absent.join(", "));
+                let absent = match plan.absent.is_empty() {
+                    true => "anything that it reads".to_owned(),
+                    false => plan.absent.join(", "),
+                };
+                let error = format!("not there: {absent}");
                 Ended::without_running(Outcome::Blocked, Known::default(), Some(error))
             }
         };

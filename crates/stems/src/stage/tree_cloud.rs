@@ -6,6 +6,7 @@ use timberline_artefact::stage::{
     Context, InputSpec, Inputs, Params, Stage, StageError, StageInfo,
 };
 use timberline_artefact::{Facts, Kind, UnitKind};
+use timberline_pointcloud::frame::quantise;
 use timberline_pointcloud::{Column, Frame, PointCloud};
 
 /// Putting the points of one tree together as a stage of a pipeline.
@@ -23,7 +24,7 @@ impl Stage for TreeCloudStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "tree-cloud",
-            version: 1,
+            version: 2,
             summary: "the points of one tree, and how likely each is on wood",
             unit: UnitKind::Tree,
             inputs: INPUTS,
@@ -42,7 +43,7 @@ impl Stage for TreeCloudStage {
             let needed = params.smallest_points as usize;
             return Err(Error::TooFewPoints { what: "points", found: cloud.len(), needed }.into());
         }
-        let mut cloud = cloud.in_canonical_order();
+        let mut cloud = in_whole_ticks(cloud.in_canonical_order());
         let positions: Vec<[f64; 3]> = (0..cloud.len()).map(|i| cloud.local(i)).collect();
         context.check_cancelled()?;
         let wood = wood::likelihood(&positions, params.wood_spacings)?;
@@ -72,6 +73,15 @@ fn stem(inputs: &Inputs, context: &Context<'_>) -> Result<Stem, StageError> {
         }
     }
     Err(missing().into())
+}
+
+/// Positions in the frame as whole ticks, without what is lost of them far from the world's origin: the
+/// same bits, and so the same choices among neighbours equally far, wherever the tree stands.
+fn in_whole_ticks(mut cloud: PointCloud) -> PointCloud {
+    for axis in [&mut cloud.x, &mut cloud.y, &mut cloud.z] {
+        axis.iter_mut().for_each(|value| *value = quantise(*value));
+    }
+    cloud
 }
 
 /// The points with the tree's label, in a frame near its base.
