@@ -7,60 +7,88 @@ use timberline_pointcloud::Nearest3;
 
 /// Neighbours a voxel is linked to.
 const NEIGHBOURS: usize = 10;
+/// No neighbour.
+const NONE: u32 = u32::MAX;
 /// Edge of the cells between which gaps are bridged, in parts of the widest gap.
 const CELLS_IN_GAP: f64 = 2.0;
 
 /// Links between positions, in both directions.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct Graph {
-    start: Vec<u32>,
+#[derive(Debug, Clone, PartialEq)]
+pub struct Graph<'a> {
+    positions: &'a [[f64; 3]],
+    start: Vec<u64>,
     to: Vec<u32>,
-    length_m: Vec<f64>,
 }
 
-impl Graph {
+impl<'a> Graph<'a> {
     /// Links every position to its nearest ones, none longer than `gap_m`, and parts that are not
     /// linked by the shortest bridges between cells of the plot.
     ///
     /// # Errors
     /// [`Error::Neighbours`].
-    pub fn new(positions: &[[f64; 3]], gap_m: f64) -> Result<Self, Error> {
+    pub fn new(positions: &'a [[f64; 3]], gap_m: f64) -> Result<Self, Error> {
         let index = Nearest3::new(positions)?;
         let near = |(from, at): (usize, &[f64; 3])| {
+            // A plot has tens of millions of voxels: rows of a fixed length take the least memory.
+            let mut row = [NONE; NEIGHBOURS];
             let found = index.nearest(at, NEIGHBOURS + 1).into_iter();
-            let linked = found.filter(|to| to.index != from);
-            let close = linked.filter(|to| to.squared_m2 <= gap_m * gap_m);
-            close.map(|to| (from as u32, to.index as u32, to.squared_m2.sqrt())).collect::<Vec<_>>()
+            let close = found.filter(|to| to.index != from && to.squared_m2 <= gap_m * gap_m);
+            row.iter_mut().zip(close).for_each(|(place, to)| *place = to.index as u32);
+            row
         };
-        let mut links: Vec<(u32, u32, f64)> =
-            positions.par_iter().enumerate().flat_map_iter(near).collect();
-        let bridges = bridges(positions, &links, gap_m);
-        links.extend(bridges);
-        Ok(Self::from_links(positions.len(), links))
+        let rows: Vec<[u32; NEIGHBOURS]> = positions.par_iter().enumerate().map(near).collect();
+        drop(index);
+        let links = || {
+            let of = |(from, row): (u32, &'_ [u32; NEIGHBOURS])| {
+                row.map(|to| (from, to)).into_iter().filter(|(_, to)| *to != NONE)
+            };
+            (0u32..).zip(&rows).flat_map(of)
+        };
+        let bridges = bridges(positions, links(), gap_m);
+        Ok(Self::from_links(positions, || links().chain(bridges.iter().copied())))
     }
 
-    fn from_links(len: usize, links: Vec<(u32, u32, f64)>) -> Self {
-        let back: Vec<_> = links.iter().map(|&(from, to, length)| (to, from, length)).collect();
-        let mut all = links;
-        all.extend(back);
-        all.sort_by_key(|link| (link.0, link.1));
-        all.dedup_by_key(|link| (link.0, link.1));
-        let mut graph = Self { start: Vec::with_capacity(len + 1), ..Self::default() };
-        let mut next = 0;
-        for from in 0..len as u32 {
-            graph.start.push(next as u32);
-            next += all[next..].iter().take_while(|link| link.0 == from).count();
+    /// Counts the links of every position, puts them in their places, and sorts and thins each row.
+    fn from_links<I: Iterator<Item = (u32, u32)>>(
+        positions: &'a [[f64; 3]],
+        links: impl Fn() -> I,
+    ) -> Self {
+        let mut end = vec![0u64; positions.len() + 1];
+        for (from, to) in links() {
+            end[from as usize + 1] += 1;
+            end[to as usize + 1] += 1;
         }
-        graph.start.push(next as u32);
-        graph.to = all.iter().map(|link| link.1).collect();
-        graph.length_m = all.iter().map(|link| link.2).collect();
-        graph
+        (1..end.len()).for_each(|at| end[at] += end[at - 1]);
+        let mut to = vec![NONE; end[positions.len()] as usize];
+        let mut next = end.clone();
+        for (a, b) in links() {
+            for (from, other) in [(a, b), (b, a)] {
+                to[next[from as usize] as usize] = other;
+                next[from as usize] += 1;
+            }
+        }
+        let mut start = vec![0u64; positions.len() + 1];
+        let mut kept = 0;
+        for from in 0..positions.len() {
+            let row = end[from] as usize..end[from + 1] as usize;
+            to[row.clone()].sort_unstable();
+            start[from] = kept as u64;
+            for place in row {
+                if kept as u64 == start[from] || to[kept - 1] != to[place] {
+                    to[kept] = to[place];
+                    kept += 1;
+                }
+            }
+        }
+        start[positions.len()] = kept as u64;
+        to.truncate(kept);
+        Self { positions, start, to }
     }
 
     /// Number of positions.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.start.len().saturating_sub(1)
+        self.positions.len()
     }
 
     /// Whether there are no positions.
@@ -72,7 +100,8 @@ impl Graph {
     /// Neighbours of a position with their distances in metres, by ascending index.
     pub fn neighbours(&self, from: u32) -> impl Iterator<Item = (u32, f64)> {
         let range = self.start[from as usize] as usize..self.start[from as usize + 1] as usize;
-        self.to[range.clone()].iter().copied().zip(self.length_m[range].iter().copied())
+        let here = self.positions[from as usize];
+        self.to[range].iter().map(move |&to| (to, distance_m(here, self.positions[to as usize])))
     }
 
     /// The part of the graph every position belongs to: the smallest index in it.
@@ -88,9 +117,13 @@ impl Graph {
 
 /// The shortest bridge between every two parts in cells that are near each other, no longer than
 /// `gap_m`.
-fn bridges(positions: &[[f64; 3]], links: &[(u32, u32, f64)], gap_m: f64) -> Vec<(u32, u32, f64)> {
+fn bridges(
+    positions: &[[f64; 3]],
+    links: impl Iterator<Item = (u32, u32)>,
+    gap_m: f64,
+) -> Vec<(u32, u32)> {
     let mut joined = Joined::new(positions.len());
-    links.iter().for_each(|(from, to, _)| joined.join(*from, *to));
+    links.for_each(|(from, to)| joined.join(from, to));
     let part: Vec<u32> = (0..positions.len() as u32).map(|at| joined.root(at)).collect();
     let cell_m = gap_m / CELLS_IN_GAP;
     let cell = |at: u32| positions[at as usize].map(|value| (value / cell_m).floor() as i32);
@@ -131,7 +164,7 @@ fn shortest(
     here: &[([i32; 3], u32)],
     there: &[([i32; 3], u32)],
     gap_m: f64,
-    found: &mut Vec<(u32, u32, f64)>,
+    found: &mut Vec<(u32, u32)>,
 ) {
     let parts = |cell: &[([i32; 3], u32)]| {
         let mut parts: Vec<u32> = cell.iter().map(|(_, at)| part[*at as usize]).collect();
@@ -161,7 +194,7 @@ fn shortest(
             }
         }
     }
-    found.extend(best.into_values().map(|(length, a, b)| (a, b, length)));
+    found.extend(best.into_values().map(|(_, a, b)| (a, b)));
 }
 
 fn distance_m(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -192,7 +225,8 @@ mod tests {
 
     #[test]
     fn links_go_both_ways() {
-        let graph = Graph::new(&row(0.0, 30), 1.0).unwrap();
+        let positions = row(0.0, 30);
+        let graph = Graph::new(&positions, 1.0).unwrap();
         for from in 0..30 {
             for (to, length) in graph.neighbours(from) {
                 assert!(graph.neighbours(to).any(|back| back == (from, length)));

@@ -86,14 +86,14 @@ pub fn cheapest(graph: &Graph, sources: &[Source]) -> Vec<u32> {
 mod tests {
     use super::*;
 
-    fn line(count: u32) -> Graph {
-        let positions: Vec<[f64; 3]> = (0..count).map(|k| [0.1 * f64::from(k), 0.0, 0.0]).collect();
-        Graph::new(&positions, 0.15).unwrap()
+    fn line(count: u32) -> Vec<[f64; 3]> {
+        (0..count).map(|k| [0.1 * f64::from(k), 0.0, 0.0]).collect()
     }
 
     #[test]
     fn the_middle_parts_equal_stems_and_moves_with_their_size() {
-        let graph = line(101);
+        let positions = line(101);
+        let graph = Graph::new(&positions, 0.15).unwrap();
         let border = |left: f64, right: f64| {
             let sources = [
                 Source { at: 0, label: 0, scale: left },
@@ -118,7 +118,8 @@ mod tests {
 
     #[test]
     fn the_order_of_sources_does_not_matter() {
-        let graph = line(50);
+        let positions = line(50);
+        let graph = Graph::new(&positions, 0.15).unwrap();
         let mut sources = [
             Source { at: 10, label: 2, scale: 1.0 },
             Source { at: 40, label: 1, scale: 1.0 },
