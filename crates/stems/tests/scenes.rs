@@ -175,9 +175,9 @@ fn what_is_no_tree_says_so() {
     for (points, words) in [
         (&wall, "of a plane: this is no tree"),
         (&line, "of a plane: this is no tree"),
-        (&same, "1 voxels: a tree takes at least 20"),
-        (&ten, "10 voxels: a tree takes at least 20"),
-        (&Vec::new(), "0 voxels: a tree takes at least 20"),
+        (&same, "1 voxels with points: a tree takes at least 20"),
+        (&ten, "10 voxels with points: a tree takes at least 20"),
+        (&Vec::new(), "0 voxels with points: a tree takes at least 20"),
         (&ground(12.0, 6000), "of a plane: this is no tree"),
     ] {
         let text = failure(points);
