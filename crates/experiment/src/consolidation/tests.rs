@@ -52,7 +52,10 @@ fn what_was_skipped_is_said_everywhere() {
     let row = all[0].rows.iter().find(|row| row.source == Source::Default).unwrap();
     assert!(row.figures.is_none() && row.remark.contains("thin already"), "{row:?}");
     let kept = all[0].rows.last().unwrap();
-    assert!(kept.figures.is_some() && kept.remark.starts_with("scanned: skipped: thin"), "{kept:?}");
+    assert!(
+        kept.figures.is_some() && kept.remark.starts_with("scanned: skipped: thin"),
+        "{kept:?}"
+    );
     let csv = text::models_csv(&all);
     let lines: Vec<&str> = csv.lines().collect();
     assert_eq!(lines.len(), 8);
