@@ -60,7 +60,7 @@ pub struct ConsolidationParams {
     #[schemars(range(min = 10, max = 1_000_000), extend("x-unit" = "points", "x-source" = "this program"))]
     pub min_points: u32,
     /// Clouds thinner than this already are not consolidated.
-    #[schemars(range(min = 0.0, max = 0.1), extend("x-unit" = "m", "x-source" = "range noise of good terrestrial scanners on bark at 10 m is 1 to 2 mm"))]
+    #[schemars(range(min = 0.0, max = 0.1), extend("x-unit" = "m", "x-source" = "measured: consolidated clouds of real trees are 1.9 mm thick and more, docs/consolidation-experiment.md; thinner ones have nothing to gain"))]
     pub noise_floor_m: f64,
     /// Where the mean distance from the points before to the surface through those after rises above
     /// this many times what it was, points are left as they were.
