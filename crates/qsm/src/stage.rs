@@ -32,7 +32,7 @@ impl Stage for CylindersStage {
     fn info() -> StageInfo {
         StageInfo {
             name: "cylinders",
-            version: 1,
+            version: 2,
             summary: "cylinders fitted along branches, radii by isotonic regression and a pipe model, diameters and volumes",
             unit: UnitKind::Tree,
             inputs: INPUTS,
