@@ -108,6 +108,7 @@ fn pass(
     let noise = own_noise.unwrap_or(params.noise_m);
     let given = Given { branches, sections: &sections, measured: &measured, noise_m: noise };
     let (radii, pipe) = radii(&given, params);
+    let radii = limited(radii, &sections, bound);
     let joints = moved(branches, &sections, &measured, &radii, &owned, noise);
     Pass { sections, owner, measured, radii, joints, noise_m: own_noise, pipe }
 }
@@ -117,6 +118,17 @@ fn bounded(measured: Vec<Option<Measured>>, bound: Option<&Bound>) -> Vec<Option
     let Some(bound) = bound else { return measured };
     let fits = |one: &Measured| one.fit.radius_m <= bound.at(one.view.origin_m[2]);
     measured.into_iter().map(|one| one.filter(fits)).collect()
+}
+
+/// Radii that no fit stands for keep to the bound, too: the pipe model of a tree with few fits may have
+/// any.
+fn limited(mut radii: Vec<Radius>, sections: &Sections, bound: Option<&Bound>) -> Vec<Radius> {
+    let Some(bound) = bound else { return radii };
+    for (radius, section) in radii.iter_mut().zip(&sections.all) {
+        let middle_z_m = 0.5 * (section.start_m[2] + section.end_m[2]);
+        radius.radius_m = radius.radius_m.min(bound.at(middle_z_m));
+    }
+    radii
 }
 
 /// Two passes: the first finds how thick branches are, whatever the skeleton says; the second fits

@@ -36,6 +36,8 @@ const ROUNDNESS: f64 = 0.01;
 const AGREEMENT: f64 = 0.1;
 /// Standard error over the diameter from which the rest of the stem may know better.
 const POOR: f64 = 0.1;
+/// Standard error over the diameter above which a diameter between measurements tells nothing.
+const UNCERTAIN: f64 = 0.33;
 /// Window of points around the expected axis, in expected radii, and in noises.
 const WINDOW: (f64, f64) = (2.0, 5.0);
 
@@ -69,9 +71,13 @@ pub fn dbh(
     if !adtree && cylinder.source == RadiusSource::Inferred {
         return None;
     }
+    let (diameter_m, sd_m) = (2.0 * cylinder.solid.radius_m, 2.0 * cylinder.radius_sd_m);
+    if !adtree && !(sd_m <= UNCERTAIN * diameter_m) {
+        return None;
+    }
     Some(Dbh {
-        diameter_m: 2.0 * cylinder.solid.radius_m,
-        sd_m: 2.0 * cylinder.radius_sd_m,
+        diameter_m,
+        sd_m,
         arc_coverage: cylinder.arc_coverage,
         points: cylinder.points,
         source: if adtree { RadiusSource::Inferred } else { RadiusSource::Interpolated },

@@ -139,6 +139,25 @@ fn breast_height_that_nobody_saw_is_interpolated() {
     assert!(dbh.sd_m < 0.1, "{dbh:?}");
 }
 
+/// A mobile scan's trees had stems of 12 m: too few fits for a pipe model, and nothing kept it in bounds.
+#[test]
+fn no_radius_is_above_what_was_seen_of_the_stem() {
+    let mut scene = forked(0.3, 12);
+    // All but a few decimetres of the high limb is lost in foliage.
+    let mut random = Random::new(3);
+    scene.points.retain(|p| (5.0..5.4).contains(&p[2]));
+    let leaf = |_| {
+        [[-2.0, 4.0], [-2.0, 4.0], [0.0, 8.0]]
+            .map(|[low, high]: [f64; 2]| random.between(low, high))
+    };
+    scene.points.extend((0..4000).map(leaf));
+    let tree = TreePoints { dbh_m: Some(0.2), ..scene.tree() };
+    let found = model_tree(&tree, &scene.skeleton, &Params::default()).unwrap();
+    let most = found.model.solids().iter().map(|c| c.radius_m).fold(0.0, f64::max);
+    assert!(most <= 0.2 + 1e-9, "{most}");
+    assert!(found.metrics.dbh.is_none_or(|dbh| dbh.diameter_m <= 0.4), "{:?}", found.metrics.dbh);
+}
+
 #[test]
 fn a_branch_within_the_stem_is_none() {
     let stem = stem();

@@ -36,7 +36,8 @@ pub struct Tree {
     pub base_m: [f64; 3],
     /// Whether the base's elevation is the ground's; otherwise that of the lowest points.
     pub on_ground: bool,
-    /// Diameter at breast height from the slices, m, where there are enough.
+    /// Diameter of the stem at breast height from the slices there, m; of all slices where these are too
+    /// few. None where no cross-section was seen.
     pub dbh_m: Option<f64>,
     /// The stem in the frame of the space; none where no cross-section was seen.
     pub axis: Option<StemAxis>,
@@ -248,7 +249,9 @@ impl Scene<'_> {
         let foot = if self.has_ground { None } else { self.foot(own, z_m) };
         let [x, y] = foot.unwrap_or_else(|| axis.at_elevation(z_m));
         let base_m = self.frame.world_from_local([x, y, z_m]);
-        let dbh_m = axis.diameter_at(BREAST_HEIGHT_M, self.params);
+        // What is seen farther up or down still tells how thick nothing on this tree can be.
+        let near = axis.diameter_at(BREAST_HEIGHT_M, self.params);
+        let dbh_m = near.or(Some(2.0 * axis.radius_m())).filter(|dbh_m| *dbh_m > 0.0);
         Tree { base_m, on_ground: self.has_ground, dbh_m, axis: Some(axis) }
     }
 
