@@ -72,7 +72,8 @@ pub fn dbh(
         return None;
     }
     let (diameter_m, sd_m) = (2.0 * cylinder.solid.radius_m, 2.0 * cylinder.radius_sd_m);
-    if !adtree && !(sd_m <= UNCERTAIN * diameter_m) {
+    let is_told = sd_m <= UNCERTAIN * diameter_m;
+    if !adtree && !is_told {
         return None;
     }
     Some(Dbh {
