@@ -71,27 +71,88 @@ pub struct Watertight {
 /// One closed surface around the tree with about so many triangles, see [`timberline_solids::closed`].
 ///
 /// Twigs that its grid cannot show are left out rather than drawn as thick as the grid: there are so many
-/// of them that they would make most of the volume.
+/// of them that they would make most of the volume. What bears a thicker piece stays, so that the surface
+/// is one.
 #[must_use]
 pub fn watertight(model: &Model<'_>, triangles: u64, finest_m: f64) -> Watertight {
     /// From one least radius to the next that is tried.
     const STEP: f64 = 1.15;
-    let all: Vec<Cylinder> = model.cylinders();
-    let of_branch = |branch| cones_of(&axis_of(&all[model.places(branch)]));
-    let cones: Vec<RoundCone> = model.qsm.branches.iter().flat_map(of_branch).collect();
-    let radius_m = |cone: &RoundCone| cone.start.1.max(cone.end.1);
-    let thickest_m = cones.iter().map(radius_m).fold(0.0, f64::max);
+    let pieces = pieces(model);
+    let thickest_m =
+        model.qsm.cylinders.iter().map(|cylinder| cylinder.radius_m).fold(0.0, f64::max);
     let mut least_m = finest_m;
     loop {
+        let bears = bearing(model, least_m);
         let kept: Vec<RoundCone> =
-            cones.iter().filter(|cone| radius_m(cone) >= least_m).copied().collect();
+            pieces.iter().filter(|(place, _)| bears[*place]).map(|(_, cone)| *cone).collect();
         let cell_m = cell_for(&kept, triangles, finest_m);
         if cell_m <= least_m || STEP * least_m > thickest_m {
+            let all: Vec<RoundCone> = pieces.iter().map(|(_, cone)| *cone).collect();
             // A tree thinner than any grid is drawn as it can be.
-            let kept = if kept.is_empty() { &cones } else { &kept };
-            let left_out = (cones.len() - kept.len()) as u64;
+            let kept = if kept.is_empty() { &all } else { &kept };
+            let left_out = (all.len() - kept.len()) as u64;
             return Watertight { closed: closed(kept, cell_m), left_out };
         }
         least_m *= STEP;
+    }
+}
+
+/// Round cones along all branches, each with the place of its cylinder.
+fn pieces(model: &Model<'_>) -> Vec<(usize, RoundCone)> {
+    let all = model.cylinders();
+    let of_branch = |branch| {
+        let places = model.places(branch);
+        let axis = axis_of(&all[places.clone()]);
+        let at = axis.iter().skip(1).map(|node| places.start + node.cylinder as usize);
+        at.zip(cones_of(&axis)).collect::<Vec<_>>()
+    };
+    model.qsm.branches.iter().flat_map(of_branch).collect()
+}
+
+/// Which cylinders have at least a radius, or bear one that has.
+fn bearing(model: &Model<'_>, least_m: f64) -> Vec<bool> {
+    let cylinders = &model.qsm.cylinders;
+    let mut bears: Vec<bool> = cylinders.iter().map(|c| c.radius_m >= least_m).collect();
+    for place in (0..cylinders.len()).rev() {
+        let parent = cylinders[place].parent.map(|parent| parent as usize);
+        if let Some(parent) = parent.filter(|parent| bears[place] && *parent < place) {
+            bears[parent] = true;
+        }
+    }
+    bears
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tree::testing::{FRAME, fork};
+    use timberline_artefact::Crs;
+
+    fn of(change: impl Fn(&mut timberline_artefact::kinds::Qsm)) -> (f64, Watertight) {
+        let (mut qsm, crs) = (fork(7), Crs::default());
+        change(&mut qsm);
+        let model = Model { qsm: &qsm, frame: FRAME, crs: &crs };
+        let volume_m3 = model.cylinders().iter().map(Cylinder::volume_m3).sum();
+        (volume_m3, watertight(&model, 200_000, 0.005))
+    }
+
+    /// Twigs were drawn as thick as the grid: a tree of many had an eighth more volume.
+    #[test]
+    fn twigs_do_not_swell_the_closed_surface() {
+        let (whole_m3, with_branch) = of(|_| ());
+        let (_, with_twig) = of(|qsm| qsm.cylinders[3].radius_m = 0.002);
+        assert_eq!((with_branch.left_out, with_twig.left_out), (0, 1));
+        let volume_m3 = |found: &Watertight| found.closed.mesh.volume_m3();
+        assert!((volume_m3(&with_branch) / whole_m3 - 1.0).abs() < 0.1, "{whole_m3}");
+        assert!(volume_m3(&with_twig) < volume_m3(&with_branch));
+    }
+
+    /// A stem that is thin in the middle fell apart.
+    #[test]
+    fn what_bears_a_thicker_piece_is_not_left_out() {
+        let (_, found) = of(|qsm| qsm.cylinders[1].radius_m = 0.004);
+        assert_eq!(found.left_out, 0);
+        let (_, found) = of(|qsm| (1..4).for_each(|place| qsm.cylinders[place].radius_m = 0.004));
+        assert_eq!(found.left_out, 3);
     }
 }
