@@ -4,6 +4,7 @@ use super::Model;
 use timberline_artefact::kinds::RadiusSource;
 use timberline_solids::closed::{Closed, RoundCone, cell_for, closed, cones_of};
 use timberline_solids::tubes::{Fineness, axis_of, tube};
+use timberline_solids::vector::along;
 use timberline_solids::{Cylinder, Mesh};
 
 /// Branches nowhere thicker than this are twigs, m: a picture of the whole tree has a few pixels for them.
@@ -97,14 +98,23 @@ pub fn watertight(model: &Model<'_>, triangles: u64, finest_m: f64) -> Watertigh
     }
 }
 
-/// Round cones along all branches, each with the place of its cylinder.
+/// Round cones along all branches, each with the place of its cylinder. Side branches begin on the axis of
+/// the cylinder that bears them: its surface may end a little before their own first cylinder.
 fn pieces(model: &Model<'_>) -> Vec<(usize, RoundCone)> {
     let all = model.cylinders();
+    let root = |place: usize| {
+        let parent = all.get(model.qsm.cylinders.get(place)?.parent? as usize)?;
+        let (along_m, _) = parent.along_and_across_m(all[place].start_m);
+        let at_m = along_m.clamp(0.0, parent.length_m());
+        let on_axis = along(parent.start_m, parent.axis().unwrap_or_default(), at_m);
+        let radius_m = all[place].radius_m.min(parent.radius_m);
+        Some((place, RoundCone { start: (on_axis, radius_m), end: (all[place].start_m, radius_m) }))
+    };
     let of_branch = |branch| {
         let places = model.places(branch);
         let axis = axis_of(&all[places.clone()]);
         let at = axis.iter().skip(1).map(|node| places.start + node.cylinder as usize);
-        at.zip(cones_of(&axis)).collect::<Vec<_>>()
+        root(places.start).into_iter().chain(at.zip(cones_of(&axis))).collect::<Vec<_>>()
     };
     model.qsm.branches.iter().flat_map(of_branch).collect()
 }
@@ -141,10 +151,33 @@ mod tests {
     fn twigs_do_not_swell_the_closed_surface() {
         let (whole_m3, with_branch) = of(|_| ());
         let (_, with_twig) = of(|qsm| qsm.cylinders[3].radius_m = 0.002);
-        assert_eq!((with_branch.left_out, with_twig.left_out), (0, 1));
+        // The piece that joins it to the stem's axis is left out with it.
+        assert_eq!((with_branch.left_out, with_twig.left_out), (0, 2));
         let volume_m3 = |found: &Watertight| found.closed.mesh.volume_m3();
         assert!((volume_m3(&with_branch) / whole_m3 - 1.0).abs() < 0.1, "{whole_m3}");
         assert!(volume_m3(&with_twig) < volume_m3(&with_branch));
+    }
+
+    /// A branch that began a little off its stem was a body of its own.
+    #[test]
+    fn a_branch_off_its_stem_is_joined_to_it() {
+        let (_, found) = of(|qsm| qsm.cylinders[3].start_m = [0.9, 0.6, 4.2]);
+        let mesh = &found.closed.mesh;
+        let mut first: Vec<usize> = (0..mesh.vertices_m.len()).collect();
+        for _ in 0..mesh.vertices_m.len() {
+            let mut changed = false;
+            for triangle in &mesh.triangles {
+                let least = triangle.iter().map(|v| first[*v as usize]).min().unwrap();
+                for vertex in triangle {
+                    changed |= first[*vertex as usize] != least;
+                    first[*vertex as usize] = least;
+                }
+            }
+            if !changed {
+                break;
+            }
+        }
+        assert!(first.iter().all(|one| *one == 0), "more than one body");
     }
 
     /// A stem that is thin in the middle fell apart.
@@ -153,6 +186,6 @@ mod tests {
         let (_, found) = of(|qsm| qsm.cylinders[1].radius_m = 0.004);
         assert_eq!(found.left_out, 0);
         let (_, found) = of(|qsm| (1..4).for_each(|place| qsm.cylinders[place].radius_m = 0.004));
-        assert_eq!(found.left_out, 3);
+        assert_eq!(found.left_out, 4);
     }
 }
