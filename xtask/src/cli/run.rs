@@ -177,6 +177,12 @@ fn farewell(args: &Args, opened: &Opened, report: &Report, progress: &Progress) 
             report.failures.len() - FAILURES_SHOWN
         ));
     }
+    if let Some(stage) = idle(report) {
+        progress.warn(&format!(
+            "nothing to do in `{stage}`: the scans hold no point that can be used; {} says why",
+            report.log.display()
+        ));
+    }
     if report.interrupted {
         progress.warn(&format!(
             "interrupted; what is finished is kept. Go on with: cargo xtask run {pipeline} {place}"
@@ -190,6 +196,17 @@ fn farewell(args: &Args, opened: &Opened, report: &Report, progress: &Progress) 
     progress.note(&format!("{verdict} in {}", duration(report.seconds)));
     progress.note(&format!("outputs: {}", opened.work.outputs().display()));
     progress.note(&format!("log:     {}", report.log.display()));
+}
+
+/// The stage that had no unit in a run that came to nothing, if all before it went well.
+fn idle(report: &Report) -> Option<&str> {
+    let ended = report.exit_code != DONE && !report.interrupted;
+    let went_well = |stage: &StageSummary| {
+        let bad = [Outcome::Failed, Outcome::Blocked, Outcome::NotRun];
+        !stage.units.is_empty() && bad.iter().all(|outcome| stage.count(*outcome) == 0)
+    };
+    let first = report.stages.iter().find(|stage| !went_well(stage));
+    first.filter(|stage| ended && stage.units.is_empty()).map(|stage| stage.stage.as_str())
 }
 
 /// The stages of a run as a table.

@@ -52,6 +52,16 @@ fn clouds_that_are_no_tree_are_refused_with_the_reason() {
     is_refused("NaN", &"nan nan nan\n".repeat(100), nan);
 }
 
+/// An empty E57 file ended the command without a word, where only warnings are shown.
+#[test]
+fn a_scan_without_points_says_so() {
+    let ply = "ply\nformat ascii 1.0\nelement vertex 0\nproperty double x\nproperty double y\n\
+               property double z\nend_header\n";
+    let ran = Campaign::of_bytes("cloud.ply", ply).try_run(&["--quiet"]);
+    let reason = "nothing to do in `tiles`: the scans hold no point that can be used";
+    assert!(ran.code == 1 && ran.said.contains(reason), "{}: {}", ran.code, ran.said);
+}
+
 #[test]
 fn points_without_a_position_are_left_out_and_said() {
     let whole = ran(&xyz(&positions(&TREE))).0;
